@@ -184,7 +184,7 @@ class ROSY_OT_show(RosyOperator, bpy.types.Operator):
 
 
 class ROSY_OT_show_here(RosyOperator, bpy.types.Operator):
-    """Show the baked pictures in this 3D view: with materials, and without the live fields over them"""
+    """Show the baked pictures in this 3D view as in renders: with materials, in the light of the scene, without live fields"""
 
     bl_label = "Show the Picture Here"
     bl_options = {"REGISTER"}
@@ -195,6 +195,7 @@ class ROSY_OT_show_here(RosyOperator, bpy.types.Operator):
         session.stop(space)
         if space.shading.type in SHADING_WITHOUT_MATERIALS:
             space.shading.type = "MATERIAL"
+        space.shading.use_scene_lights = space.shading.use_scene_world = True
 
 
 class ROSY_OT_remove(RosyOperator, bpy.types.Operator):

@@ -242,8 +242,12 @@ def _draw_view_hints(layout: UILayout, context: Context, bake_infos: list[BakeIn
     view, camera = context.space_data, context.scene.camera
     column = layout.column(align=True)
     is_live = session.is_live(view)
-    if is_live or view.shading.type in SHADING_WITHOUT_MATERIALS:
-        reason = "Live fields cover the picture" if is_live else "This view does not show materials"
+    reason = "Live fields cover the picture" if is_live else ""
+    if not is_live and view.shading.type in SHADING_WITHOUT_MATERIALS:
+        reason = "This view does not show materials"
+    elif not is_live and view.shading.type == "MATERIAL" and not view.shading.use_scene_lights:
+        reason = "This view has no lights of the scene" if context.scene.rosy.relight else ""
+    if reason:
         column.label(text=reason, icon="INFO")
         column.operator("rosy.show_here")
     in_camera_view = view.region_3d is not None and view.region_3d.view_perspective == "CAMERA"

@@ -254,6 +254,24 @@ def test_animation_asks_for_a_folder():
     assert Path(scene.rosy.directory) == folder
 
 
+def test_relit_pictures_are_shown_in_the_lights_of_the_scene():
+    """The view then follows the light, without a new bake."""
+    yield from scene_with_field()
+    call_in_view(bpy.ops.rosy.preset_apply, preset="engraving")
+    bpy.context.scene.rosy.relight = True
+    call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True)
+    view()[1].spaces.active.region_3d.view_perspective = "CAMERA"
+    call_in_view(bpy.ops.rosy.show_here)
+    darkness = []
+    for angle in (-1.2, 1.2):  # the sun is at the left, then at the right
+        bpy.data.objects["Sun"].rotation_euler = 0.6, angle, 0.0
+        yield 6.0
+        picture = capture(f"relit-{angle:g}", view()[2])
+        left, right = np.array_split(picture.mean(axis=2), 2, axis=1)
+        darkness.append(right.mean() - left.mean())
+    assert abs(darkness[0] - darkness[1]) > 0.03
+
+
 def test_bake_the_current_view():
     yield from scene_with_field()
     call_in_view(bpy.ops.rosy.bake, "EXEC_DEFAULT", True, camera="VIEW")

@@ -373,6 +373,7 @@ class RosyScene(bpy.types.PropertyGroup):
     remember_live: toggle(
         "Remember in File",
         "Save which views are live with the file, and show them again when it is opened",
+        default=True,
     )
     live_views: bpy.props.StringProperty(
         description="Views that were live when the file was saved: index of the area and name of the "

@@ -180,7 +180,7 @@ def test_quad_view(monkey):
 @live()
 def test_edits_are_followed(monkey):
     """The look, the transform, modifiers, edit mode, sculpting and undo."""
-    bpy.context.view_layer.objects.active = monkey
+    bpy.context.view_layer.objects.active, monkey_name = monkey, monkey.name
     bpy.context.scene.rosy.look.gain = 1.2
     yield from check_is_bake("live-look")
     monkey.location.x, monkey.rotation_euler.z, monkey.scale.y = 0.4, 0.5, 1.5
@@ -213,6 +213,19 @@ def test_edits_are_followed(monkey):
         bpy.ops.ed.undo()
     yield 0.5
     yield from check_is_bake("live-undone")
+    point = {"name": "", "pressure": 1.0}
+    stroke = [{**point, "location": (x, -0.9, 0.1), "is_start": x < 0} for x in (-0.3, 0.0, 0.3)]
+    with in_view():
+        bpy.context.view_layer.objects.active = bpy.data.objects[monkey_name]
+        bpy.data.objects[monkey_name].select_set(True)
+        bpy.ops.rosy.field_comb("EXEC_DEFAULT", True, stroke=stroke, radius=0.5)
+        bpy.data.objects[monkey_name].select_set(False)
+        bpy.ops.ed.undo_push(message="combed")
+    yield from check_is_bake("live-combed")
+    for operator in (bpy.ops.ed.undo, bpy.ops.ed.redo):
+        call_in_view(operator)
+        yield 0.5
+        yield from check_is_bake(f"live-{operator.idname_py()}")
 
 
 @live()

@@ -34,13 +34,19 @@ SURFACE_OFFSET = 0.004
 #: The singularities that are shown, by the session UIDs of their objects.
 _SINGULARITIES: dict[int, Singularities] = {}
 
+#: The tools whose handles are shown, by the session UIDs of the objects. Handles are hidden without the tool.
+_TOOLS: dict[int, str] = {}
+
 #: The draw handlers, while something is shown.
 DRAW_HANDLERS: list[Any] = []
 
 
-def show(obj: bpy.types.Object, singularities: Singularities) -> None:
-    """Show the singularities of an object, in place of those shown before."""
-    _SINGULARITIES[obj.session_uid] = singularities
+def show(obj: bpy.types.Object, singularities: Singularities, tool: str = "") -> None:
+    """Show the singularities of an object, in place of those shown before.
+
+    With the identifier of a tool, they are shown while it is active.
+    """
+    _SINGULARITIES[obj.session_uid], _TOOLS[obj.session_uid] = singularities, tool
     add_handlers(_APP_HANDLERS)
     if not DRAW_HANDLERS and not bpy.app.background:
         add = bpy.types.SpaceView3D.draw_handler_add
@@ -53,7 +59,7 @@ def hide(obj: bpy.types.Object | None = None) -> None:
     """Hide the singularities of an object, or of all objects if it is None. Forget those of deleted objects."""
     kept = () if obj is None else {other.session_uid for other in bpy.data.objects if other != obj}
     for uid in _SINGULARITIES.keys() - kept:
-        del _SINGULARITIES[uid]
+        del _SINGULARITIES[uid], _TOOLS[uid]
     if not _SINGULARITIES:
         remove_handlers(_APP_HANDLERS)
         while DRAW_HANDLERS:
@@ -67,12 +73,13 @@ def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> No
     If they cannot be computed, for example because a modifier loses the field, they are hidden.
     """
     for obj in context.view_layer.objects:
-        shown_before = shown(obj)
+        shown_before = _SINGULARITIES.get(obj.session_uid)
         if shown_before is None or field_mesh(obj) not in meshes:
             continue
         read = read_singularities if shown_before.vertex is None else read_editable_singularities
         try:
-            show(obj, read(obj, context.evaluated_depsgraph_get()))
+            singularities = read(obj, context.evaluated_depsgraph_get())
+            show(obj, singularities, _TOOLS[obj.session_uid])
         except RosyError:
             hide(obj)
 
@@ -90,7 +97,15 @@ _APP_HANDLERS["load_pre"] = lambda *_: hide()
 
 def shown(obj: bpy.types.Object) -> Singularities | None:
     """Return the shown singularities of an object; None if they are not shown."""
-    return _SINGULARITIES.get(obj.session_uid)
+    tool = _TOOLS.get(obj.session_uid)
+    return None if tool and not _is_active(tool) else _SINGULARITIES.get(obj.session_uid)
+
+
+def _is_active(tool: str) -> bool:
+    """Return whether a tool of 3D views is active in the present mode."""
+    context = bpy.context
+    active = context.workspace and context.workspace.tools.from_space_view3d_mode(context.mode)
+    return bool(active) and active.idname == tool
 
 
 def _all_dots() -> list[SingularityDots]:

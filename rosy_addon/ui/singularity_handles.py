@@ -116,7 +116,8 @@ def show_handles(context: Context, obj: Object) -> None:
     shown = overlay.shown(obj)
     if shown is None or shown.vertex is None:
         depsgraph = context.evaluated_depsgraph_get()
-        overlay.show(obj, read_editable_singularities(obj, depsgraph))
+        tool = VIEW3D_TOOL_rosy_singularities.bl_idname if shown is None else ""
+        overlay.show(obj, read_editable_singularities(obj, depsgraph), tool)
 
 
 def _own_points(context: Context, obj: Object) -> np.ndarray:

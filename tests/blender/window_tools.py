@@ -61,6 +61,7 @@ def test_singularities_dragged_with_the_tool():
     added = dict(shown_singularities().items() - before.items())
     assert sorted(added.values()) == [-1, 1]
     call_in_view(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
+    assert overlay.shown(bpy.context.object) is None
 
 
 def test_field_combed_with_the_tool():

@@ -153,7 +153,6 @@ class Look:
             "flow visualization: soft streaks that fade, whose drift takes little time per frame",
         },
         option_labels={"brute": "Brute Force", "ibfv": "IBFV"},
-        panel="quality",
     )
     weights: str = choice(
         "cosine",
@@ -178,7 +177,6 @@ class Look:
             "smooth": "Average the face values at the corners and interpolate",
             "flat": "Use the value of the face",
         },
-        panel="quality",
         panel_before="method",
         stage=Stage.GBUFFER,
     )
@@ -277,13 +275,13 @@ class Look:
         1024.0,
         "Remove noise variations wider than this many pixels, so that crossing streaks do not form "
         "clouds. 0: keep them, as in the paper",
+        panel="",
     )
     detail: float = number(
         0.0,
         0.0,
         0.9,
         "Draw narrower lines on small features, by up to this fraction",
-        panel="streaks",
         applies=lambda look: look.anchor == "surface",
     )
     anchor: str = choice(
@@ -322,7 +320,7 @@ class Look:
         16.0,
         "Contrast of the streaks. 1: as with a single direction",
         panel_before="high_pass",
-        **_shading("streaks", lambda look: not is_hatched(look)),
+        **_shading("", lambda look: not is_hatched(look)),
     )
     guiding_angle: float = number(
         0.0,
@@ -498,7 +496,7 @@ class Look:
         4,
         "Samples per pixel along each axis",
         panel="quality",
-        panel_before="display",
+        panel_before="anchor",
         stage=Stage.GBUFFER,
     )
 

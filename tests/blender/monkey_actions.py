@@ -32,8 +32,10 @@ NAMES = (
     "a/b\\c", "line\nbreak\ttab", "\x01\x1b[31m", "é 日本 🙂", "x" * 200, "", " ", ".", "..", "con",
     "%s {0} {x}", "'quote\" `", "-flag", "a.001", "RoSy Camera", "rosy", "rosy_guides", "dir0", "mine",
     "position", "Suzanne", "Eye", "UVMap", "Weights", "Occlusion", "default", "engraving",
-    "rosy_material", "rosy_projection", "rosy_angle", "material_index",
+    "rosy_material", "rosy_projection", "rosy_angle",
 )  # fmt: skip
+if bpy.app.version >= (5, 0):  # before, Blender's own Set Material crashes on it, if it is no face index
+    NAMES += ("material_index",)
 
 #: Probability that a job is disturbed while it runs.
 DISTURBANCE = 0.5

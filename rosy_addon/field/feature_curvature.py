@@ -9,7 +9,7 @@ from .connection import build_connection
 from .connectivity import smooth_fans
 from .creases import filtered_normals, principal_extent, salient_edges, weighted_median
 from .curvature import face_curvature, with_smooth_normals
-from .frames import angle_between, dot, normalize
+from .frames import angle_between, dot, normalize, transport
 from .polygon_arrays import face_area_vectors
 from .surface import Surface
 from .surface_averages import SurfaceAverages
@@ -81,9 +81,8 @@ def noisy_curvature(surface: Surface) -> NoisyCurvature:
     x, y = surface.face_frames
     mean, deviator = _bounded_curvature(surface, fans, x, y)
     noisy = surface.with_parts(vertices=surface.vertices + noise)
-    normal = noisy.face_normal
-    x_noisy = normalize(x - dot(x, normal)[:, None] * normal)
-    mean_noisy, deviator_noisy = _bounded_curvature(noisy, fans, x_noisy, np.cross(normal, x_noisy))
+    frames_noisy = (transport(each, surface.face_normal, noisy.face_normal) for each in (x, y))
+    mean_noisy, deviator_noisy = _bounded_curvature(noisy, fans, *frames_noisy)
     averages = SurfaceAverages(surface, build_connection(surface), x, y)
     noise = mean_noisy - mean, deviator_noisy - deviator
     return NoisyCurvature(ends, averages, mean, deviator, *noise)

@@ -16,7 +16,7 @@ from .creases import weighted_median
 from .curvature import outer_sides
 from .edge_guides import coherent_edge_guides
 from .feature_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
-from .frames import dot, normalize
+from .frames import dot, transport
 from .guided_system import GuidedSystem, guided_field
 from .representation import from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
@@ -108,9 +108,11 @@ def form(surface: Surface, degree: int) -> RosyField:
         field = guided_field(surface, degree, guides, weight, at_edge, FIELD_TOLERANCE)
     if flat is original:
         return field
-    normal = original.face_normal
-    vectors = field.vectors - dot(field.vectors, normal)[:, None] * normal
-    return RosyField(degree, normalize(vectors) * normal.any(axis=1)[:, None])
+    # All members are rotated alike, into the plane of a face on either side.
+    source, target = surface.face_normal, original.face_normal
+    side = np.copysign(1.0, dot(source, target))
+    vectors = transport(field.vectors, source, side[:, None] * target)
+    return RosyField(degree, vectors * target.any(axis=1)[:, None])
 
 
 def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from field_helpers import angle_differences, bumpy, symmetric_head
 from scipy.spatial.transform import Rotation
-from shapes import cube, globe, icosphere, plane, rebuilt
+from shapes import cube, globe, icosphere, plane, rebuilt, roughened
 
 from rosy_addon.core.errors import NoFeaturesError
 from rosy_addon.field.analysis import dirichlet_energy
@@ -13,11 +13,22 @@ from rosy_addon.field.surface import build_surface, with_delaunay_triangles
 
 TURN = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
 GLOBE = rebuilt(globe(12, 20), globe(12, 20).vertices @ TURN)
+ROUGH = roughened(bumpy(icosphere(2)), 0.06)
 SHEET = plane(9, 7).vertices @ [[1, 0.2, 0.3], [0.1, 0.8, 0], [0, 0, 1]]
+
+
+def folded(surface):
+    """The surface with its first face folded over a neighbor."""
+    vertices, (a, b, c) = surface.vertices.copy(), surface.faces[0]
+    vertices[a] = 0.75 * (vertices[b] + vertices[c]) - 0.5 * vertices[a]
+    return rebuilt(surface, vertices)
+
+
 MESHES = {
     "triangles": bumpy(icosphere(3)),
     "quads": bumpy(GLOBE),
     "sheet": rebuilt(plane(9, 7), SHEET + np.outer(np.sin(2 * SHEET[:, 0] + 1), [0, 0, 0.4])),
+    "rough": folded(ROUGH),
 }
 KINDS = {
     "form": (1, 2, 4),
@@ -67,7 +78,7 @@ def test_a_field_depends_on_the_shape_alone(name, kind, degree):
     try:
         expected = made(surface, kind, degree).vectors
     except NoFeaturesError:
-        assert kind == "features" and name != "sheet"
+        assert kind == "features" and name in ("triangles", "quads")
         return
     for change in CHANGES:
         mesh, back = changed(surface, change)

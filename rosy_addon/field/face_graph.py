@@ -7,7 +7,7 @@ opposite angles (Pinkall and Polthier, *Computing Discrete Minimal Surfaces and 
 simpler factor is the distance between the two face centers, divided by the length of the edge. It equals
 the exact factor only if the line between the centers is perpendicular to the edge.
 
-A face with more than three corners is divided into a chain of triangles. Its direction is the mean direction of
+A face with more than three corners is divided into Delaunay triangles. Its direction is the mean direction of
 its triangles.
 """
 
@@ -22,11 +22,9 @@ from .analysis import edge_lengths
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
 from .connectivity import connected_components, connected_corners, sums_from_roots
 from .frames import dot
-from .polygon_arrays import next_corners
 from .representation import edge_unfolding, matching_angles
 from .singularities import signed_corner_angles
-from .surface import Surface
-from .triangulate import chain_corners
+from .surface import Surface, with_delaunay_triangles
 
 #: Smallest and largest conductance of an edge, relative to the median of all edges.
 MAX_CONDUCTANCE_RATIO = 1e4
@@ -266,15 +264,15 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
 
 @dataclass(frozen=True, eq=False)
 class TriangleGraph:
-    """The graph of the triangles of a surface, where each face is a chain of triangles; see
-    `triangulate.chain_corners`.
+    """The graph of the triangles of a surface, where each face is a tree of Delaunay triangles.
 
     Attributes
     ----------
     graph : FaceGraph
         The graph with the T triangles as its faces. Its M edges are the I edges between faces, followed by
-        the edges within faces. The conductance of an edge is half the sum of the cotangents of the two
-        opposite angles. It may be negative, but the matrix of the potential is positive semidefinite.
+        the edges within faces, from each triangle to its children. The conductance of an edge is half the sum
+        of the cotangents of the two opposite angles. It may be negative, but the matrix of the potential is
+        positive semidefinite.
     weight : (M, 2) float64 ndarray
         Half the cotangent of the angle opposite each edge, in the source and in the target triangle.
     triangle_face : (T,) intp ndarray
@@ -335,9 +333,10 @@ class TriangleGraph:
         The parameters are those of `on_faces`: turning angles (M,), and turns to the centroids (T,).
         """
         face, inner = self.triangle_face, slice(self.face_edge_count, None)
-        step = np.zeros(len(face))
-        step[self.graph.target[inner]] = angle[inner]
-        turn = np.cumsum(step)
+        source, target = self.graph.source[inner], self.graph.target[inner]
+        parent, step = np.arange(len(face)), np.zeros(len(face))
+        parent[target], step[target] = source, angle[inner]
+        turn = sums_from_roots(parent, step)[1]
         mean = np.bincount(face, self.area * (turn + to_center)) / np.bincount(face, self.area)
         return turn - mean[face]
 
@@ -362,33 +361,28 @@ class TriangleGraph:
 
 def triangle_graph(faces: FaceGraph) -> TriangleGraph:
     """Return the graph of the triangles of a surface, given the graph of its faces."""
-    surface, size = faces.surface, np.diff(faces.surface.face_start)
-    face = np.repeat(np.arange(len(size)), size - 2)
-    rank = np.arange(len(face)) - (np.cumsum(size - 2) - (size - 2))[face]
-    local, opposite_next = chain_corners(rank, size[face])
-    corner = surface.face_start[face][:, None] + local
-    cotangent, area = _cotangents(surface.vertices[surface.corner_vertex[corner]])
-    # Edges between faces. For each corner, the side of a triangle that starts there and is an edge of the face.
+    surface = with_delaunay_triangles(faces.surface)
+    corner, face = surface.triangles, surface.triangle_face
+    cotangent, area = _cotangents(surface.vertices[surface.triangle_vertex])
     tail, head = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
-    sides = np.flatnonzero(head == next_corners(surface.face_start)[tail])
+    # The corners of a triangle are in the order of the face, so that the tail of one side has a larger number than the
+    # head. It is the last side of the face, or divides the triangle from its parent. Each diagonal has both directions.
+    is_outer = head == surface.next_corner[tail]
+    outer, down = np.flatnonzero(is_outer), np.flatnonzero(~is_outer & (tail < head))
+    up = np.flatnonzero(~is_outer & (tail > head))
+    down, up = down[np.lexsort((head[down], tail[down]))], up[np.lexsort((tail[up], head[up]))]
     side = np.empty(len(surface.corner_vertex), dtype=np.intp)
-    side[tail[sides]] = sides
-    sides = [side[start] for start in faces.halfedges.T]
-    triangles = [each // 3 for each in sides]
-    weights = [cotangent[each // 3, (each + 2) % 3] / 2 for each in sides]
-    # Edges within faces, between each triangle and the next one.
-    inner = np.flatnonzero(rank > 0)
-    triangles = [np.concatenate(pair) for pair in zip(triangles, (inner - 1, inner), strict=True)]
-    inner_weights = cotangent[inner - 1, opposite_next[inner - 1]] / 2, cotangent[inner, 2] / 2
-    weights = [np.concatenate(pair) for pair in zip(weights, inner_weights, strict=True)]
-    weight = np.stack(weights, axis=1)
+    side[tail[outer]] = outer
+    sides = np.concatenate([side[faces.halfedges], np.stack([down, up], axis=1)])
+    source, target = sides.T // 3
+    weight = cotangent[sides // 3, (sides + 2) % 3] / 2
     graph = replace(
         faces,
-        source=triangles[0],
-        target=triangles[1],
-        unfolding=np.concatenate([faces.unfolding, np.zeros(len(inner))]),
-        tail=np.concatenate([faces.tail, faces.corner_node[corner[inner, 1]]]),
-        head=np.concatenate([faces.head, faces.corner_node[corner[inner, 0]]]),
+        source=source,
+        target=target,
+        unfolding=np.concatenate([faces.unfolding, np.zeros(len(down))]),
+        tail=faces.corner_node[tail[sides[:, 0]]],
+        head=faces.corner_node[head[sides[:, 0]]],
         conductance=weight.sum(axis=1),
         component=faces.component[face],
     )

@@ -162,11 +162,11 @@ def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray
     first_triangle = (np.cumsum(count) - count)[triangle_face]
     step = np.arange(len(triangle_face), dtype=np.int32) - first_triangle
     first, size, apex = face_start[triangle_face], size[triangle_face], apex[triangle_face]
-    local = (chain_corners(step, size)[0] + apex[:, None]) % size[:, None]
+    local = (chain_corners(step, size) + apex[:, None]) % size[:, None]
     return (first[:, None] + local).astype(np.int32), triangle_face
 
 
-def chain_corners(rank: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def chain_corners(rank: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Return the corners of the triangles of faces. Each triangle has a side in common with the next one.
 
     They are a fan around the first corner of the face or, in a face with more than `MAX_FAN` corners, a strip between
@@ -179,16 +179,14 @@ def chain_corners(rank: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.nd
 
     Returns
     -------
-    corners : (T, 3) int ndarray
+    (T, 3) int ndarray
         Corners, counted from 0 in the face, counter-clockwise. The last one is not in the previous triangle.
-    opposite_next : (T,) int ndarray
-        The corner, 0 or 1, that is not in the next triangle.
     """
     half, odd = np.divmod(np.where(size > MAX_FAN, rank, 0), 2)
     is_fan = size <= MAX_FAN
     second = np.where(is_fan, rank + 1, half + odd + 1)
     third = np.where(is_fan, rank + 2, np.where(odd, -half - 1, half + 2))
-    return np.stack([-half, second, third], axis=1) % size[:, None], 1 - odd
+    return np.stack([-half, second, third], axis=1) % size[:, None]
 
 
 def _fan_apexes(

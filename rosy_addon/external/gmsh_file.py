@@ -1,9 +1,11 @@
-"""Read `.msh` files of Gmsh in the formats 4.1 and 2.2, whose data refer to nodes and elements by their tags.
+"""Read `.msh` files of Gmsh in the formats 4.1, 4.0 and 2.2, whose data refer to nodes and elements by their tags.
 
 meshio assumes that data are complete and in the order of the file, and refuses nodes with parameters.
 """
 
 from collections.abc import Iterator
+from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -34,11 +36,11 @@ _LINES = {15: 1, 1: 2, 8: 3, 26: 4, 27: 5, 28: 6}
 
 _NODE_COUNTS = _LINES | {kind: nodes for kind, (_, _, nodes) in _CELLS.items()}
 
-#: The versions of the format that `read_gmsh` reads.
-VERSIONS = (b"2.2", b"4.1")
+#: The versions of the format that `read_gmsh` reads. Gmsh writes 4 for 4.0.
+VERSIONS = (b"2.2", b"4", b"4.0", b"4.1")
 
-#: In text of the format 2.2, this many rows at most are compared at once to find elements of one type. With 100,
-#: an element takes 0.6 microseconds, or 12 if types alternate; with 1000, 0.6 and 30.
+#: In the format 2.2, this many rows at most are compared at once to find rows of one length. With 100, an element in
+#: text takes 0.6 microseconds, or 12 if types alternate; with 1000, 0.6 and 30.
 _RUN = 100
 
 
@@ -67,7 +69,9 @@ class _Section:
         if self._words is not None:
             rows = self.take("<f8", count * (1 + columns)).reshape(count, 1 + columns)
             return rows[:, 0].astype(np.int64), rows[:, 1:]
-        table = np.frombuffer(self._data, [("tag", "<i4"), ("row", "<f8", (columns,))], count)
+        row = np.dtype([("tag", "<i4"), ("row", "<f8", (columns,))])
+        table = np.frombuffer(self._data, row, count, self._position)
+        self._position += table.nbytes
         return table["tag"].astype(np.int64), table["row"]
 
 
@@ -91,11 +95,17 @@ def read_gmsh(path: Path) -> Any:
 
     sections, is_text = _sections(read_bytes(path))
     named = dict(sections)
-    if not {b"Nodes", b"Elements"} <= set(named):
+    in_nodes = b"Nodes" if b"Nodes" in named else b"ParametricNodes"
+    if not {in_nodes, b"Elements"} <= set(named):
         raise RosyError(f"{path}: cannot be read: it has no nodes, or no elements")
-    is_old = named[b"MeshFormat"].split()[0] == b"2.2"
-    nodes, rows = (_nodes_2, _rows_2) if is_old else (_nodes, _rows)
-    node_tags, points = nodes(named[b"Nodes"], is_text)
+    version = named[b"MeshFormat"].split()[0]
+    if version == b"2.2":
+        nodes = _nodes_2 if in_nodes == b"Nodes" else _parametric_nodes_2
+        rows = _rows_2
+    else:
+        is_old = version != b"4.1"
+        nodes, rows = (partial(each, is_old=is_old) for each in (_nodes, _rows))
+    node_tags, points = nodes(named[in_nodes], is_text)
     tags, sizes, types, corner_tags = _elements(rows(named[b"Elements"], is_text))
     corner_point = _find(node_tags, corner_tags)
     if (corner_point < 0).any():
@@ -128,17 +138,22 @@ def _sections(data: bytes) -> tuple[list[tuple[bytes, bytes]], bool]:
     return sections, dict(sections)[b"MeshFormat"].split()[1] == b"0"
 
 
-def _nodes(data: bytes, is_text: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return the tags and the (n, 3) positions of the nodes."""
+def _nodes(data: bytes, is_text: bool, is_old: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tags and the (n, 3) positions of the nodes, from the format 4.1 or, if `is_old`, 4.0."""
     section = _Section(data, is_text)
-    block_count = section.take("<u8", 4)[0]
+    block_count = section.take("<u8", 2 if is_old else 4)[0]
     tags, points = [np.empty(0, np.int64)], [np.empty((0, 3))]
     for _ in range(int(block_count)):
-        dimension, _, is_parametric = section.take("<i4", 3)
+        *entity, is_parametric = section.take("<i4", 3).tolist()
         count = int(section.take("<u8", 1)[0])
-        tags.append(section.take("<u8", count).astype(np.int64))
-        columns = 3 + int(dimension) * bool(is_parametric)
-        points.append(section.take("<f8", count * columns).reshape(count, columns)[:, :3])
+        columns = 3 + entity[1 if is_old else 0] * bool(is_parametric)
+        if is_old:
+            block_tags, rows = section.tagged_rows(count, columns)
+        else:
+            block_tags = section.take("<u8", count).astype(np.int64)
+            rows = section.take("<f8", count * columns).reshape(count, columns)
+        tags.append(block_tags)
+        points.append(rows[:, :3])
     return np.concatenate(tags), np.concatenate(points)
 
 
@@ -148,17 +163,42 @@ def _nodes_2(data: bytes, is_text: bool) -> tuple[np.ndarray, np.ndarray]:
     return _Section(data, is_text).tagged_rows(count, 3)
 
 
-def _rows(data: bytes, is_text: bool) -> Iterator[tuple[int, np.ndarray]]:
+def _parametric_nodes_2(data: bytes, is_text: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the result of `_nodes_2`, from rows that also have the dimension and the tag of a part, and parameters.
+
+    Points and volumes have no parameters, curves have one and surfaces two.
+    """
+    left, data = _counted(data)
+    if is_text:
+        rows = np.loadtxt(BytesIO(data), usecols=range(4), max_rows=left, ndmin=2)
+        return rows[:, 0].astype(np.int64), rows[:, 1:]
+    tags, points, position = [np.empty(0, np.int64)], [np.empty((0, 3))], 0
+    while left > 0:
+        dimension = int(np.frombuffer(data, "<i4", 1, position + 28)[0])
+        layout = [("tag", "<i4"), ("point", "<f8", (3,)), ("part", "<i4", (2,))]
+        row = np.dtype([*layout, ("parameters", "<f8", (dimension % 3,))])
+        count = min(left, _RUN, (len(data) - position) // row.itemsize)
+        rows = np.frombuffer(data, row, count, position)
+        rows = rows[np.logical_and.accumulate(rows["part"][:, 0] == dimension)]
+        if not len(rows):
+            raise ValueError("it ends too early")
+        tags.append(rows["tag"].astype(np.int64))
+        points.append(rows["point"])
+        position, left = position + rows.nbytes, left - len(rows)
+    return np.concatenate(tags), np.concatenate(points)
+
+
+def _rows(data: bytes, is_text: bool, is_old: bool) -> Iterator[tuple[int, np.ndarray]]:
     """Yield blocks of elements: their type, and rows of their tag and the tags of their nodes.
 
     All elements of a block have the same type, a number of Gmsh. `data` is the contents of the section
-    Elements of the format 4.1.
+    Elements of the format 4.1 or, if `is_old`, 4.0.
     """
-    section = _Section(data, is_text)
-    for _ in range(int(section.take("<u8", 4)[0])):
+    section, dtype = _Section(data, is_text), "<i4" if is_old else "<u8"
+    for _ in range(int(section.take("<u8", 2 if is_old else 4)[0])):
         kind, count = int(section.take("<i4", 3)[2]), int(section.take("<u8", 1)[0])
         columns = 1 + _node_count(kind)
-        yield kind, section.take("<u8", count * columns).reshape(count, columns).astype(np.int64)
+        yield kind, section.take(dtype, count * columns).reshape(count, columns).astype(np.int64)
 
 
 def _rows_2(data: bytes, is_text: bool) -> Iterator[tuple[int, np.ndarray]]:

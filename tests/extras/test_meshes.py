@@ -21,11 +21,11 @@ def total_area(mesh):
     return np.linalg.norm(face_area_vectors(*mesh.polygons), axis=1).sum()
 
 
-def write_meshio(path, mesh, **options):
+def write_meshio(path, mesh, write=meshio.write, **options):
     points = np.asarray(mesh.points, dtype=np.float64)
     cells = [("triangle", mesh.regular_faces)]
     arrays = {name: mesh.point_data[name] for name in mesh.point_data}
-    meshio.write(path, meshio.Mesh(points, cells, point_data=arrays), **options)
+    write(path, meshio.Mesh(points, cells, point_data=arrays), **options)
 
 
 WRITERS = {
@@ -36,6 +36,7 @@ WRITERS = {
     "grid.vtu": lambda path, mesh: mesh.cast_to_unstructured_grid().save(path),
     "block.vtm": lambda path, mesh: pv.MultiBlock([mesh, None]).save(path),
     "old.msh": lambda path, mesh: write_meshio(path, mesh, file_format="gmsh22"),
+    "older.msh": lambda path, mesh: write_meshio(path, mesh, meshio.gmsh.write, fmt_version="4.0"),
     "new.msh": lambda path, mesh: write_meshio(path, mesh, file_format="gmsh"),
     "salome.med": write_meshio,
     "hdf.xdmf": write_meshio,

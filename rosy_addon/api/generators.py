@@ -262,7 +262,7 @@ def prescribed(
     vectors : (F, 3) array_like or Field, optional
         Guides: one vector for each face, zero where there is no guide. On each connected part of the mesh,
         the whole field is rotated by one angle, which aligns it with the guides as well as possible. Without
-        guides, it is aligned with the edges of the faces.
+        guides, it is aligned with the edges of the faces, or rotated as the smoothest field if N is odd.
     reach : float
         If it is above 0, the field also bends toward the guides. Their influence falls off over this
         distance, which is a fraction of the size of the mesh.

@@ -23,6 +23,7 @@ from .blocks import mask
 from .conjugate_gradient import conjugate_gradient
 from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
+from .free_rotation import freely_rotated
 from .representation import complex_bincount, from_representation, to_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_matrix import from_edges
@@ -79,8 +80,8 @@ def prescribed_field(
         Their indices in units of 1 / N.
     guides : (F, 3) ndarray, optional
         Member vectors that the field should follow; zero on faces without a guide. On each connected
-        component, the whole field is rotated by one angle to align it with the guides, or with the edges
-        of the mesh if there are no guides.
+        component, the whole field is rotated by one angle to align it with the guides. Without guides, it is
+        aligned with the edges of the mesh, or as `free_rotation` does if the degree is odd.
     reach : float
         If it is above 0, the field also bends toward the guides locally. The influence of a guide falls off
         over this distance, in object space.
@@ -105,9 +106,12 @@ def prescribed_field(
     node_index = index_at_nodes(graph, vertex, index)
     angle, direction = _turning(graph, degree, node_index)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
-    points, face = surface.vertices[surface.corner_vertex], surface.corner_face
-    edge_z = to_representation(points[surface.next_corner] - points, x[face], y[face], degree)
-    z *= _rotation_to(complex_bincount(face, edge_z, surface.face_count), z, graph.component)
+    if degree % 2:  # edges have no sign, and around a face of degree 1 they add up to 0
+        z = freely_rotated(surface, z, degree)
+    else:
+        points, face = surface.vertices[surface.corner_vertex], surface.corner_face
+        edge_z = to_representation(points[surface.next_corner] - points, x[face], y[face], degree)
+        z *= _rotation_to(complex_bincount(face, edge_z, surface.face_count), z, graph.component)
     if guides is not None:
         target = to_representation(normalize(np.asarray(guides, dtype=np.float64)), x, y, degree)
         z *= _rotation_to(target, z, graph.component)

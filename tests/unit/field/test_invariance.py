@@ -37,7 +37,7 @@ KINDS = {
     "curvature": (2, 4, 6),
     "features": range(1, 7),
     "extended": (2, 4, 6),
-    "prescribed": (2, 4, 6),
+    "prescribed": (1, 2, 3, 4),
 }
 CASES = [(kind, degree) for kind, degrees in KINDS.items() for degree in degrees]
 CHANGES = "moved", "larger", "reversed", "renumbered", "turned"

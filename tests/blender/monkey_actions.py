@@ -34,7 +34,10 @@ NAMES = (
     "position", "Suzanne", "Eye", "UVMap", "Weights", "Occlusion", "default", "engraving",
     "rosy_material", "rosy_projection", "rosy_angle",
 )  # fmt: skip
-if bpy.app.version >= (5, 0):  # before, Blender's own Set Material crashes on it, if it is no face index
+if bpy.app.version >= (
+    5,
+    0,
+):  # before, Blender's own Set Material crashes on it, if it is no face index
     NAMES += ("material_index",)
 
 #: Probability that a job is disturbed while it runs.

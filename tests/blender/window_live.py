@@ -5,6 +5,7 @@ Run by run.py, as window_panel.py is.
 
 import math
 import os
+from dataclasses import replace
 from unittest.mock import patch
 
 import bpy
@@ -14,6 +15,7 @@ from extension import preferences, rosy, switch_extension
 from live_views import (
     CAUSES,
     REST_LOAD,
+    bare_view,
     check_is_bake,
     check_nothing_is_left,
     eroded,
@@ -39,6 +41,61 @@ def test_every_view_is_a_bake(monkey):
         look_from(azimuth, elevation)
         view()[1].spaces.active.region_3d.view_perspective = perspective
         yield from check_is_bake(f"live-view-{azimuth}")
+
+
+@live()
+def test_a_camera_view_is_the_drawing_of_the_picture(monkey):
+    """With lengths in percent, lines are as wide as in a picture of three times the size, also when zoomed."""
+    scene, region_3d = bpy.context.scene, view()[1].spaces.active.region_3d
+    scene.render.resolution_x, scene.render.resolution_y = 1800, 1200
+    scene.camera = add_camera("Camera", (0.6, -5.0, 1.2), (1.35, 0.0, 0.1))
+    look = rosy("rosy_addon.preset_files.store").load_preset("engraving").look
+    rosy("rosy_addon.scene.look_properties").apply_look(
+        scene.rosy, replace(look, unit="percent", line_distance=24.0, light="lamp")
+    )
+    camera = rosy("rosy_addon.scene.cameras").camera_of_object
+    bare_view()
+    region_3d.view_perspective, region_3d.view_camera_zoom = "CAMERA", 20.0
+    for zoom in (20.0, -5.0):
+        region_3d.view_camera_zoom = zoom
+        yield from wait_for_final_pictures()
+        seen = capture(f"live-percent-{zoom:g}", view()[2])
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        (drawn,), _ = rosy("rosy_addon.scene.read_view").read_views(
+            scene, depsgraph, [camera(scene, depsgraph, scene.camera)], look_of(scene)
+        )
+        picture = rosy("rosy_addon.rendering.draw").draw_picture(drawn).rgba
+        paper = rosy("rosy_addon.core.color").from_hex(look.paper_color)
+        shown = rosy("rosy_addon.core.color").to_display(picture[..., :3])
+        picture = np.where(picture[..., 3:] > 0, shown, paper).mean(axis=2)
+        with in_view():
+            view_camera = rosy("rosy_addon.scene.cameras").camera_of_view(view()[2], region_3d)
+            frame = rosy("rosy_addon.viewport.view3d").camera_frame(bpy.context, view_camera)
+        low, high = ((np.array(end) + 1) / 2 * seen.shape[1::-1] for end in frame)
+        seen = in_grid(seen.mean(axis=2), *low, *high)
+        correlation = np.corrcoef(seen.ravel(), in_grid(picture).ravel())[0, 1]
+        assert correlation > 0.9, f"zoom {zoom}: {correlation:.3f}"
+
+
+def look_of(scene):
+    return rosy("rosy_addon.scene.look_properties").read_look(scene.rosy)
+
+
+def in_grid(tones, left=0.0, low=0.0, right=None, high=None):
+    """Return the mean tones in the (120, 180) cells of a rectangle of a picture."""
+    rows, columns = tones.shape
+    ends = (
+        (low, rows if high is None else high, 120),
+        (left, columns if right is None else right, 180),
+    )
+    for axis, (start, stop, count) in enumerate(ends):
+        total = np.insert(np.cumsum(tones, axis=axis), 0, 0.0, axis=axis)
+        place = np.linspace(start, stop, count + 1)
+        at = np.clip(np.floor(place).astype(int), 0, tones.shape[axis] - 1)
+        part = np.expand_dims(place - at, 1 - axis)
+        total = np.take(total, at, axis) + part * np.take(tones, at, axis)
+        tones = np.diff(total, axis=axis) / (place[1] - place[0])
+    return tones
 
 
 @live(is_on=False)

@@ -10,7 +10,7 @@ from ..core.file_io import write_bytes
 from ..gpu.select import picture_steps, select_device
 from ..rendering import turntable
 from ..rendering.view_input import ViewInput
-from ..scene.look_properties import read_look
+from ..scene.look_properties import object_looks, read_look
 from ..scene.read_view import read_turntable, scene_depsgraph
 from ..scene.video import encode_video
 from ..worker.job import Call, Step, Steps, job
@@ -69,7 +69,7 @@ def render_turntable(
         If the field cannot be read or drawn, neither the camera nor the streaks move, or the video cannot be
         written.
     """
-    look = read_look(scene.rosy)
+    (look,) = object_looks(scene, [obj], read_look(scene.rosy))
     look = replace(look, supersampling=max(look.supersampling, MIN_SUPERSAMPLING))
     turntable.check_still(look, still, obj.name)
     device = select_device(scene.rosy.device.lower(), look)

@@ -3,7 +3,7 @@
 For each camera there is at most one Grease Pencil object and one Curves object. Records in
 ``scene.rosy.strokes`` identify them. An object that the user has copied has no record and is never changed.
 When strokes are drawn again, the object gets new data, and keeps its modifiers, name and collections. If the
-user has edited its strokes, it is left as it is, loses its record, and the new strokes go into a new object.
+user has edited its strokes, it belongs to the user from then on, and the new strokes go into a new object.
 """
 
 from typing import Any
@@ -124,7 +124,7 @@ def store_strokes(
         data = DATA_BUILDERS[kind](name, geometry, first_frame, register)
         record = _find_record(scene, kind, camera)
         obj = None if record is None else record.thing
-        if edited_strokes(scene, kind, camera) is not None:
+        if (edited := edited_strokes(scene, kind, camera)) is not None:
             obj = None
         if obj is None:
             obj = track(bpy.data.objects.new(name, data))
@@ -132,6 +132,9 @@ def store_strokes(
             (collection if is_usable else scene.collection).objects.link(obj)
             obj.visible_shadow = False
             obj.use_grease_pencil_lights = False
+    for block in (edited.data, *edited.data.materials) if edited else ():
+        if block is not None and OWNED_TAG in block:
+            del block[OWNED_TAG]
     if obj.data != data:
         old_data, obj.data = obj.data, data
         _remove_data(old_data)

@@ -319,6 +319,7 @@ def test_edited_strokes_are_recognized_and_kept(wall, camera, scene, tmp_path, k
     result = draw_strokes(scene, kind=kind, style=WIDE)
     assert result.obj != obj and obj.name in scene.objects
     assert f"'{obj.name}' was edited and stays" in result.notes[-1]
+    assert not any(block.get("rosy_made") for block in (obj.data, *obj.data.materials))
     assert edited_strokes(scene, kind, "Camera") is None
     assert remove_strokes(scene) == 1
     assert contents() == kept

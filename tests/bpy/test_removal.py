@@ -1,5 +1,6 @@
 """Whatever users do with objects that show pictures: Remove leaves nothing of RoSy's, and all of theirs."""
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -223,6 +224,24 @@ def test_attributes_of_the_user_with_the_same_name_stay(name, tmp_path):
     for other in ("Plain", "Sheet"):
         names = [attribute.name for attribute in obj(other).data.attributes]
         assert [found for found in names if found.startswith("rosy_")] == [name]
+
+
+def test_the_other_of_two_attributes_with_one_name_stays(tmp_path):
+    """Blender 4.2 and 4.3 allow two in different domains, and may remove the one that was not asked for."""
+    scene = build()
+    bake(scene)
+    apply("Plain")(tmp_path)
+    mesh = obj("Plain").data
+    edited = bmesh.new()
+    edited.from_mesh(mesh)
+    edited.loops.layers.int.new("rosy_projection")
+    edited.to_mesh(mesh)
+    edited.free()
+    names = [attribute.name for attribute in mesh.attributes]
+    remove_bakes(scene)
+    if names.count("rosy_projection") == 2:
+        kinds = {(attribute.name, attribute.domain) for attribute in mesh.attributes}
+        assert ("rosy_projection", "CORNER") in kinds
 
 
 def test_objects_without_materials_have_no_slots_afterwards(tmp_path):

@@ -11,13 +11,14 @@ from ..annotation.singularity_settings import singularity_dots_choice, singulari
 from ..core.color import alpha_from_hex
 from ..core.settings import (
     Stage,
-    always,
     check_settings,
     choice,
     color,
     fraction,
     number,
     numbers,
+    pixel_length,
+    shading_arguments,
     switch,
     with_settings,
 )
@@ -98,30 +99,9 @@ def has_tone_inks(look: Any) -> bool:
     return is_hatched(look) and look.hue == "tone"
 
 
-def _shading(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, Any]:
-    """Return keyword arguments that declare a setting of a look that has no effect on LIC images.
-
-    They are for `number`, `choice` and similar functions of `core.settings`. `panel` and `applies` are
-    attributes of `Setting`: where the setting is shown, and when it has an effect.
-    """
-    return {"panel": panel, "stage": Stage.SHADING, "applies": applies}
-
-
-def _pixel_length(
-    default: float, high: float, text: str, low: float = 0.0, **description: Any
-) -> Any:
-    """Return a dataclass field for a setting that is a length in pixels, scaled with the picture.
-
-    `text` is the help text, `low` and `high` are the range; `description` has further arguments of `number`.
-    By default, it is in the panel "streaks".
-    """
-    description = {"panel": "streaks", **description}
-    return number(default, low, high, text, is_pixel_length=True, **description)
-
-
 def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
     """Return the arguments of most settings of the panel "Ink"; `applies`: when they have an effect."""
-    return _shading("ink", applies)
+    return shading_arguments("ink", applies)
 
 
 @dataclass(frozen=True)
@@ -180,14 +160,14 @@ class Look:
         panel_before="method",
         stage=Stage.GBUFFER,
     )
-    line_width: float = _pixel_length(
+    line_width: float = pixel_length(
         1.5,
         256.0,
         "Width of the streaks in pixels, which is the size of a cell of the noise",
         low=0.5,
         preview_low=0.75,
     )
-    line_distance: float = _pixel_length(
+    line_distance: float = pixel_length(
         3.0,
         512.0,
         "Distance between even lines in pixels. At half coverage, lines are half as wide",
@@ -226,7 +206,7 @@ class Look:
         panel="streaks",
         applies=lambda look: look.unit == "millimeters",
     )
-    length: int = _pixel_length(
+    length: int = pixel_length(
         40,
         8000,
         "Length of the streaks in pixels, in each direction",
@@ -246,15 +226,15 @@ class Look:
         panel="streaks",
         applies=_has_streaks,
     )
-    arrows: float = _pixel_length(
+    arrows: float = pixel_length(
         0.0,
         65536.0,
         "Least distance in pixels between the arrowheads that show which way lines point. An arrowhead is a "
         "quarter of this distance long. For fields of odd degree. 0: none",
         label="Arrowheads",
-        **_shading("streaks"),
+        **shading_arguments("streaks"),
     )
-    flow: float = _pixel_length(
+    flow: float = pixel_length(
         0.0,
         256.0,
         "Pixels that streaks drift along the field per frame, in animations and live views. Lines of fields "
@@ -270,7 +250,7 @@ class Look:
         "several directions easier to tell apart",
         panel="streaks",
     )
-    high_pass: float = _pixel_length(
+    high_pass: float = pixel_length(
         16.0,
         1024.0,
         "Remove noise variations wider than this many pixels, so that crossing streaks do not form "
@@ -311,7 +291,7 @@ class Look:
             "color in the lights",
         },
         option_labels={"one": "Single"},
-        **_shading("color"),
+        **shading_arguments("color"),
     )
     seed: int = number(0, 0, 2**31 - 1, "Random seed of the noise", panel="quality")
     gain: float = number(
@@ -320,7 +300,7 @@ class Look:
         16.0,
         "Contrast of the streaks. 1: as with a single direction",
         panel_before="high_pass",
-        **_shading("", lambda look: not is_hatched(look)),
+        **shading_arguments("", lambda look: not is_hatched(look)),
     )
     guiding_angle: float = number(
         0.0,
@@ -353,7 +333,7 @@ class Look:
         "magnitude have no length at the first and full length at the second. If the bottom value is above the top value, the map is inverted. Both 0: from 0 to "
         "the largest visible magnitude, or the range of the numbers",
         {"Bottom Value": (-1e30, 1e30), "Top Value": (-1e30, 1e30)},
-        **_shading("color", lambda look: uses_magnitude(look) or colors_values(look)),
+        **shading_arguments("color", lambda look: uses_magnitude(look) or colors_values(look)),
     )
     color_map: str = choice(
         "viridis",
@@ -363,7 +343,7 @@ class Look:
             "magma": "Black through red to pale yellow",
             "gray": "Black to white",
         },
-        **_shading("color", lambda look: colors_magnitude(look) or colors_values(look)),
+        **shading_arguments("color", lambda look: colors_magnitude(look) or colors_values(look)),
     )
     undefined: str = choice(
         "auto",
@@ -375,10 +355,10 @@ class Look:
             "texture": "Noise or spots without a direction",
         },
         option_labels={"auto": "Automatic"},
-        **_shading("color"),
+        **shading_arguments("color"),
     )
     shading: float = fraction(
-        0.7, "Strength of the diffuse shading in the picture", **_shading("light")
+        0.7, "Strength of the diffuse shading in the picture", **shading_arguments("light")
     )
     light: str = choice(
         "scene",
@@ -391,12 +371,12 @@ class Look:
         },
         label="Light Source",
         panel_label="Source",
-        **_shading("light", _is_lit),
+        **shading_arguments("light", _is_lit),
     )
     shadows: bool = switch(
         False,
         "Cast shadows of the lamp. Lights of the scene cast theirs, and the headlight casts none",
-        **_shading("light", lambda look: _is_lit(look) and look.light == "lamp"),
+        **shading_arguments("light", lambda look: _is_lit(look) and look.light == "lamp"),
     )
     tone: str = choice(
         "light",
@@ -409,20 +389,20 @@ class Look:
         },
         label="Tone Source",
         panel_label="Source",
-        **_shading("tone"),
+        **shading_arguments("tone"),
     )
     tone_lit: bool = switch(
         False,
         "Multiply the tone by the light",
         label="Multiply by Light",
-        **_shading("tone", lambda look: look.tone != "light"),
+        **shading_arguments("tone", lambda look: look.tone != "light"),
     )
     tone_levels: tuple[float, float, float] = numbers(
         (0.0, 1.0, 1.0),
         "Input values that become black and white, and the gamma of the tones between, as the levels of "
         "image programs. White below black inverts the tone. A gamma above 1 lightens, one below 1 darkens",
         {"Black": (-1e6, 1e6), "White": (-1e6, 1e6), "Gamma": (0.05, 20.0)},
-        **_shading("tone"),
+        **shading_arguments("tone"),
     )
     ink: str = choice(
         "soft",
@@ -437,7 +417,7 @@ class Look:
         label="Ink Style",
         panel_label="Style",
         option_labels={"even": "Evenly Spaced"},
-        **_shading("ink"),
+        **shading_arguments("ink"),
     )
     ink_color: str = color(
         "#08080d",
@@ -465,7 +445,7 @@ class Look:
     breaks: float = fraction(
         0.0, "Amount by which lines are broken into pieces, in light tones first", **_ink()
     )
-    overshoot: float = _pixel_length(
+    overshoot: float = pixel_length(
         0.0,
         256.0,
         "Maximum distance in pixels by which lines continue past the borders of tones, getting thinner",
@@ -482,7 +462,7 @@ class Look:
         "Amount by which the grain of the paper breaks up the ink, as with pencil and charcoal",
         **_ink(),
     )
-    outline: float = _pixel_length(
+    outline: float = pixel_length(
         0.0,
         64.0,
         "Width in pixels of ink lines along silhouettes, borders and sharp creases. 0: none",

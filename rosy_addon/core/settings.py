@@ -317,6 +317,27 @@ def with_settings(settings: Settings, changes: Mapping[str, Any]) -> Settings:
     return replace(settings, **values)
 
 
+def shading_arguments(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, Any]:
+    """Return keyword arguments that declare a setting of a look that has no effect on LIC images.
+
+    They are for `number`, `choice` and similar functions of `core.settings`. `panel` and `applies` are
+    attributes of `Setting`: where the setting is shown, and when it has an effect.
+    """
+    return {"panel": panel, "stage": Stage.SHADING, "applies": applies}
+
+
+def pixel_length(
+    default: float, high: float, text: str, low: float = 0.0, **description: Any
+) -> Any:
+    """Return a dataclass field for a setting that is a length in pixels, scaled with the picture.
+
+    `text` is the help text, `low` and `high` are the range; `description` has further arguments of `number`.
+    By default, it is in the panel "streaks".
+    """
+    description = {"panel": "streaks", **description}
+    return number(default, low, high, text, is_pixel_length=True, **description)
+
+
 def pixel_lengths(cls: type) -> list[Number]:
     """Return the descriptions of settings that are lengths in pixels; see `Number.is_pixel_length`."""
     described = settings_of(cls).values()

@@ -202,7 +202,7 @@ class Look:
         1.0,
         1e5,
         "Pixels of the picture per inch of paper",
-        label="Dots per Inch",
+        label="DPI",
         panel="streaks",
         applies=lambda look: look.unit == "millimeters",
     )

@@ -61,7 +61,6 @@ def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> Non
     row = box.row()
     row.label(text=obj.name, icon="OUTLINER_OB_MESH")
     row.prop(obj.rosy, "include", text="Draw")
-    box.prop(obj.rosy, "preset", icon="PRESET")
     has_attribute = mesh.rosy.attribute in mesh.attributes
     name = f"'{mesh.rosy.attribute}'" if has_attribute else "dir0 ..."
     faces = counted(len(mesh.polygons), "face")
@@ -266,18 +265,34 @@ def _draw_view_transform_warning(layout: UILayout, scene: Scene) -> None:
         button.data_path, button.value = "scene.view_settings.view_transform", "Standard"
 
 
-class COLLECTION_PT_rosy(Panel):
-    """The preset of the objects in a collection."""
+class _PropertiesPanel:
+    """Base class of the panels in the properties editor: the preset of an object or a collection."""
 
     bl_label = "RoSy"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
-    bl_context = "collection"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Context) -> None:
         sidebar.use_property_columns(self.layout)
-        self.layout.prop(context.collection.rosy, "preset", icon="PRESET")
+        owner = context.object if self.bl_context == "object" else context.collection
+        self.layout.prop(owner.rosy, "preset", icon="PRESET")
 
 
-CLASSES = (VIEW3D_PT_rosy, COLLECTION_PT_rosy)
+class OBJECT_PT_rosy(_PropertiesPanel, Panel):
+    """The preset of an object with a field."""
+
+    bl_context = "object"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return context.object is not None and has_field(context.object)
+
+
+class COLLECTION_PT_rosy(_PropertiesPanel, Panel):
+    """The preset of the objects in a collection."""
+
+    bl_context = "collection"
+
+
+CLASSES = (VIEW3D_PT_rosy, OBJECT_PT_rosy, COLLECTION_PT_rosy)

@@ -16,7 +16,8 @@ SVG = "{http://www.w3.org/2000/svg}"
 def with_stroke_settings(with_field, scene):
     """Suzanne with a field, and the settings of strokes."""
     settings = scene.rosy.strokes
-    settings.spacing, settings.width, settings.outline, settings.taper = 7.0, 2.0, True, 0.0
+    settings.spacing, settings.width, settings.outline, settings.taper = 7.0, 2.0, 1.0, 0.0
+    settings.from_look = False
     return with_field
 
 
@@ -111,6 +112,7 @@ def test_curves_follow_a_mesh_that_is_bent(scene):
     tube, bend = bent_tube()
     settings = scene.rosy.strokes
     settings.kind, settings.follow, settings.hidden = "CURVES", True, True
+    settings.from_look = False
     assert bpy.ops.rosy.strokes() == {"FINISHED"}
     strokes = next(obj for obj in scene.objects if obj.type == "CURVES")
     drawn = np.array([point.position for point in strokes.data.points])

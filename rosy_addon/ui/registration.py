@@ -12,6 +12,7 @@ from . import (
     preset_library,
     properties,
     strokes_panel,
+    translations,
 )
 
 #: Functions that register all classes but those of properties. Panels are shown in this order.
@@ -22,6 +23,7 @@ _register_classes, _unregister_classes = bpy.utils.register_classes_factory(
 
 def register() -> None:
     """Add properties, panels and preferences to Blender."""
+    translations.register()
     preset_library.register()
     properties.register()
     _register_classes()
@@ -37,5 +39,6 @@ def unregister() -> None:
     _unregister_classes()
     properties.unregister()
     preset_library.unregister()
+    translations.unregister()
     overlay.hide()
     job_status.unregister()

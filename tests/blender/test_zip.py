@@ -14,7 +14,7 @@ TOP_LEVEL |= {"LICENSE", "__init__.py", "operators", "presets", "rosy_addon"}
 #: The folder of the presets.
 PRESETS = "presets/"
 
-SUFFIXES = {"py", "toml", "json", "glsl", "png", "txt", "dat"}
+SUFFIXES = {"py", "toml", "json", "glsl", "png", "txt", "dat", "po"}
 
 #: Modules that come with Blender.
 BLENDER_MODULES = {"bpy", "bmesh", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf", "numpy"}
@@ -54,6 +54,7 @@ FILES_WITH_PATHS = {
     "scene/video.py": "the script that encodes videos",
     "ui/comb_brush.py": "the icon of the tool",
     "ui/singularity_handles.py": "the icon of the tool",
+    "ui/translations.py": "translations of the interface",
     HELPER_FILE: "the package, which helpers run",
 }
 

@@ -16,6 +16,7 @@
 #
 #   make fuzz      random hostile files and options, for FUZZ_SECONDS from FUZZ_SEED on
 #   make monkey    random actions in a full Blender: make monkey BLENDER=/path/to/blender
+#   make translations  update the texts in rosy_addon/ui/locale/*.po
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
 #   make dist      all files of a release: zip, wheel, sdist and dist/SHA256SUMS
 #   make gallery   the pictures of docs/gallery
@@ -57,7 +58,7 @@ test-quick test-unit test-oldest test-newest test-extras test-notebooks: export 
 test-quick test-unit: export LP_NUM_THREADS = 0
 
 .PHONY: demo format check lint test-quick test test-unit test-oldest test-newest test-package test-wheel \
-        test-extras test-notebooks site fuzz monkey zip dist check-tag gallery bench clean distclean
+        test-extras test-notebooks site fuzz monkey translations zip dist check-tag gallery bench clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -128,6 +129,9 @@ site: test-notebooks
 
 fuzz: .venv-extras/ready
 	$(EXTRAS) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $(FUZZ_SECONDS)
+
+translations: .venv-bpy42/ready
+	$(OLDEST) -m tools.translations
 
 zip: .venv-bpy42/ready
 	$(OLDEST) tools/build_zip.py dist

@@ -20,6 +20,7 @@ from ..rosy_addon.jobs.bake_texture import TextureResult, bake_texture
 from ..rosy_addon.scene.datablocks import is_editable
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.ui.property_makers import toggle
+from ..rosy_addon.ui.translations import translated
 from ..rosy_addon.worker.job import Steps, reverting
 from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects
 from .modal_job import ModalJobMixin
@@ -58,7 +59,7 @@ class ROSY_OT_bake_texture(ModalJobMixin, Operator):
     def draw(self, context: Context) -> None:
         names = ", ".join(f"'{name}'" for name in self._missing)
         column = self.layout.column(align=True)
-        column.label(text=f"No UV map: {names}", icon="ERROR")
+        column.label(text=translated("No UV map: {names}").format(names=names), icon="ERROR")
         column.label(text="Unwrap with Smart UV Project, and bake the texture?")
 
     def begin(self, context: Context) -> Steps[list[TextureResult]]:

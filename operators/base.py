@@ -20,6 +20,7 @@ from ..rosy_addon.scene.mesh_fields import assign_fields
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status, live_views, overlay
 from ..rosy_addon.ui.preferences import apply_preferences
+from ..rosy_addon.ui.translations import translated
 
 
 class Condition(NamedTuple):
@@ -91,7 +92,7 @@ class RosyOperator:
         """
         for condition in cls.conditions:
             if not condition.holds(context):
-                cls.poll_message_set(condition.message)
+                cls.poll_message_set(translated(condition.message))
                 return False
         return True
 

@@ -15,6 +15,7 @@ from ..rosy_addon.scene.files import user_presets_folder
 from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.ui import preset_library
 from ..rosy_addon.ui.property_makers import file_filter, text, toggle
+from ..rosy_addon.ui.translations import translated
 from ..rosy_addon.viewport.view3d import redraw
 from .base import Condition, RosyOperator
 
@@ -151,8 +152,9 @@ class ROSY_OT_preset_remove(_PresetOperator, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         name = preset_library.preset_name(_target_preset(self, context))
-        question, message = f"Delete the preset '{name}'?", "This cannot be undone"
-        return self.ask_to_confirm(context, event, question, message, "Delete")
+        question = translated("Delete the preset '{name}'?").format(name=name)
+        message, verb = translated("This cannot be undone"), translated("Delete")
+        return self.ask_to_confirm(context, event, question, message, verb)
 
     def act(self, context: bpy.types.Context) -> None:
         key = _target_preset(self, context)

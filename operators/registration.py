@@ -1,5 +1,7 @@
 """Register the operators with Blender."""
 
+from typing import Any
+
 import bpy
 
 from ..rosy_addon.ui.comb_brush import VIEW3D_TOOL_rosy_comb, VIEW3D_TOOL_rosy_comb_sculpt
@@ -55,20 +57,26 @@ CLASSES = tuple(
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
 
+#: The tools that call operators, with their places among Blender's.
+TOOLS: dict[type, dict[str, Any]] = {
+    VIEW3D_TOOL_rosy_comb: {"separator": True},
+    VIEW3D_TOOL_rosy_singularities: {"after": {VIEW3D_TOOL_rosy_comb.bl_idname}},
+    VIEW3D_TOOL_rosy_comb_sculpt: {"separator": True},
+}
+
+
 def register() -> None:
     """Register the operators and the tools that call them."""
     _register_classes()
-    bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb, separator=True)
-    bpy.utils.register_tool(VIEW3D_TOOL_rosy_singularities, after={VIEW3D_TOOL_rosy_comb.bl_idname})
-    bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb_sculpt, separator=True)
+    for tool, place in TOOLS.items():
+        bpy.utils.register_tool(tool, **place)
 
 
 def unregister() -> None:
     """Stop the current job and the live view, and unregister the tools and the operators."""
     modal_job.stop_current_job()
     session.stop()
-    bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_comb_sculpt)
-    bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_singularities)
-    bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_comb)
+    for tool in reversed(TOOLS):
+        bpy.utils.unregister_tool(tool)
     brush_mouse.unregister()
     _unregister_classes()

@@ -11,6 +11,7 @@ from ..core.errors import as_sentence
 from ..core.settings import Numbers, Setting, Switch, panel_settings, settings_of, title
 from . import preset_library, sidebar
 from .operator_settings import draw_settings
+from .translations import translated
 
 #: Keys of the panels with settings of a look, from top to bottom. Settings refer to panels by these keys.
 LOOK_PANELS = ("streaks", "color", "light", "tone", "ink", "singularities", "quality")
@@ -65,16 +66,19 @@ class VIEW3D_PT_rosy_look(sidebar.SidebarPanel, Panel):
         entry = preset_library.active_entry(settings)
         row = column.row(align=True)
         if entry is None:
-            row.label(text=f"{Path(settings.preset_name).stem}: not found")
+            row.label(
+                text=translated("{name}: not found").format(name=Path(settings.preset_name).stem)
+            )
         else:
             changed = preset_library.is_changed(settings)
-            row.label(text=f"{entry.preset.name}, changed" if changed else entry.preset.name)
+            text = translated("{name}, changed") if changed else "{name}"
+            row.label(text=text.format(name=translated(entry.preset.name)))
         row.operator("rosy.preset_save", text="", icon="ADD")
         row.menu("VIEW3D_MT_rosy_presets", text="", icon="DOWNARROW_HLT")
         if entry is not None:
             lines = column.column(align=True)
             lines.scale_y, lines.active = 0.8, False
-            for line in sidebar.wrap_to_sidebar(entry.preset.description, context):
+            for line in sidebar.wrap_to_sidebar(translated(entry.preset.description), context):
                 lines.label(text=line)
 
 
@@ -171,7 +175,7 @@ def _draw_setting(column: UILayout, look: PropertyGroup, setting: Setting) -> No
         for index, part in enumerate(setting.parts):
             column.prop(look, setting.name, index=index, text=part)
         return
-    label = setting.panel_label or setting.label
+    label = translated(setting.panel_label or setting.label)
     if len(label) <= MAX_LABEL_LENGTH or isinstance(setting, Switch):
         column.prop(look, setting.name, text=label)
         return
@@ -234,7 +238,7 @@ class VIEW3D_PT_rosy_look_key(sidebar.SidebarPanel, Panel):
                 sidebar.new_row(column, active=getattr(settings, part)).prop(settings, name)
         draw_settings(column, settings, "key_caption", "key_size")
         if settings.key and settings.key_bar and _range_may_differ(settings):
-            hint = "For numbers on the color bar of animations, set Color > Top Value"
+            hint = translated("For numbers on the color bar of animations, set Color > Top Value")
             sidebar.draw_wrapped(layout, context, [hint])
 
 

@@ -4,7 +4,6 @@ import bpy
 from bpy.types import Context, Menu, Object, Panel, Scene, UILayout
 
 from ..compositor.look import has_flow, is_hatched
-from ..core.errors import counted
 from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.computed_attributes import other_field_names
@@ -18,6 +17,7 @@ from ..viewport import session
 from ..viewport.view3d import redraw
 from . import job_status, overlay, sidebar
 from .operator_settings import draw_convert_settings, draw_generator_settings, draw_settings
+from .translations import translated
 
 #: Types of objects that Blender can convert to meshes.
 CONVERTIBLE_TYPES = ("CURVE", "SURFACE", "FONT", "META")
@@ -44,14 +44,14 @@ def _draw_field_section(layout: UILayout, context: Context) -> None:
     obj = context.view_layer.objects.active
     layout.label(text="1.  Field", icon="FORCE_VORTEX")
     if obj is not None and obj.type in CONVERTIBLE_TYPES:
-        layout.label(text=f"{obj.name} is not a mesh", icon="INFO")
+        layout.label(text=translated("{name} is not a mesh").format(name=obj.name), icon="INFO")
         layout.operator("object.convert", text="Convert to Mesh", icon="MESH_DATA").target = "MESH"
     elif obj is None or obj.type != "MESH":
         layout.label(text="Select a mesh to draw on")
     elif has_field(obj):
         _draw_existing_field(layout, context, obj)
     else:
-        layout.label(text=f"{obj.name} has no field yet")
+        layout.label(text=translated("{name} has no field yet").format(name=obj.name))
         _draw_new_field(layout, context)
 
 
@@ -63,8 +63,10 @@ def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> Non
     row.prop(obj.rosy, "include", text="Draw")
     has_attribute = mesh.rosy.attribute in mesh.attributes
     name = f"'{mesh.rosy.attribute}'" if has_attribute else "dir0 ..."
-    faces = counted(len(mesh.polygons), "face")
-    box.label(text=f"Degree {mesh.rosy.degree} on {faces}, {name}")
+    count = len(mesh.polygons)
+    faces = translated("1 face" if count == 1 else "{count:,} faces").format(count=count)
+    text = translated("Degree {degree} on {faces}, {name}")
+    box.label(text=text.format(degree=mesh.rosy.degree, faces=faces, name=name))
     if is_shaded_flat(obj.data):
         layout.label(text="Flat shading shows each face", icon="INFO")
         layout.operator("object.shade_smooth_by_angle", icon="SMOOTHCURVE")
@@ -73,13 +75,15 @@ def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> Non
     is_shown = overlay.shown(obj) is not None
     button = row.operator("rosy.singularities", icon="OVERLAY", depress=is_shown)
     button.show = "NONE" if is_shown else "OVERLAY"
-    if (body := sidebar.closed_panel(layout, "convert_field", "Convert")) is not None:
+    if (body := sidebar.closed_panel(layout, "convert_field", title="Convert")) is not None:
         _draw_convert_settings(body, context)
     other_fields = other_field_names(mesh)
-    body = sidebar.closed_panel(layout, "compare_field", "Compare") if other_fields else None
+    if other_fields:
+        body = sidebar.closed_panel(layout, "compare_field", title="Compare")
+        if body is not None:
+            _draw_compare_settings(body, context, other_fields)
+    body = sidebar.closed_panel(layout, "another_field", title="Make Another Field")
     if body is not None:
-        _draw_compare_settings(body, context, other_fields)
-    if (body := sidebar.closed_panel(layout, "another_field", "Make Another Field")) is not None:
         _draw_new_field(body, context)
 
 
@@ -121,8 +125,9 @@ def _draw_picture_section(layout: UILayout, context: Context) -> None:
     if session.is_live(context.space_data):
         layout.prop(context.scene.rosy, "remember_live")
         if has_flow(context.scene.rosy.look):
-            text = "Pause" if session.is_flow_playing() else "Play"
-            layout.operator("rosy.flow_play", text=text, icon=text.upper())
+            playing = session.is_flow_playing()
+            icon = "PAUSE" if playing else "PLAY"
+            layout.operator("rosy.flow_play", text="Pause" if playing else "Play", icon=icon)
     if job_status.current is not None:
         sidebar.draw_progress(layout)
     else:
@@ -148,7 +153,7 @@ def _draw_bakes(layout: UILayout, context: Context) -> None:
     elif objects:
         layout.prop(settings, "camera")
     if len(objects) > 1:
-        layout.label(text=f"Draws {len(objects)} objects")
+        layout.label(text=translated("Draws {count} objects").format(count=len(objects)))
     row = sidebar.new_row(layout, scale_y=1.5)
     row.operator("rosy.bake", text=bake_label(bake_infos), icon="RENDER_STILL")
     row = layout.row(align=True)
@@ -168,13 +173,13 @@ def bake_label(bake_infos: list[BakeInfo]) -> str:
     """Return the label of the button that bakes a single picture, given the existing bakes of the scene."""
     pictures = [bake for bake in bake_infos if not bake.is_texture]
     if any(bake.frame_range and bake.is_shown for bake in pictures):
-        return "Bake Still"
-    return "Bake Again" if pictures else "Bake"
+        return translated("Bake Still")
+    return translated("Bake Again" if pictures else "Bake")
 
 
 def _draw_texture_settings(layout: UILayout, context: Context) -> None:
     """Draw the settings and the button that bake textures."""
-    if (body := sidebar.closed_panel(layout, "texture", "Texture")) is None:
+    if (body := sidebar.closed_panel(layout, "texture", title="Texture")) is None:
         return
     obj = context.view_layer.objects.active
     column = body.column()
@@ -209,25 +214,34 @@ def draw_overlay_popover(popover: Menu, context: Context) -> None:
 def _draw_bake_info(layout: UILayout, context: Context, bake: BakeInfo, several: bool) -> None:
     box = layout.box().column(align=True)
     if bake.is_texture:
-        box.label(text=f"Texture of {bake.camera}", icon="TEXTURE")
+        box.label(text=translated("Texture of {name}").format(name=bake.camera), icon="TEXTURE")
     else:
-        box.label(text=f"From {bake.camera}", icon="CAMERA_DATA")
+        box.label(text=translated("From {name}").format(name=bake.camera), icon="CAMERA_DATA")
     row = box.row()
-    row.label(text=f"{bake.width} x {bake.height} {'texels' if bake.is_texture else 'pixels'}")
+    size = translated(
+        "{width} x {height} texels" if bake.is_texture else "{width} x {height} pixels"
+    )
+    row.label(text=size.format(width=bake.width, height=bake.height))
     if bake.frame_range:
-        box.label(text=f"Frames {bake.frame_range}", icon="RENDER_ANIMATION")
+        box.label(
+            text=translated("Frames {range}").format(range=bake.frame_range),
+            icon="RENDER_ANIMATION",
+        )
     if several and bake.is_shown:
         row.label(text="Shown", icon="HIDE_OFF")
     elif several:
         row.operator("rosy.show", text="Show").camera = bake.camera
     if bake.stale_reason:
-        sidebar.draw_wrapped(box, context, [f"Out of date: {bake.stale_reason}"], "ERROR")
+        reason = translated("Out of date: {reason}").format(reason=bake.stale_reason)
+        sidebar.draw_wrapped(box, context, [reason], "ERROR")
     elif bake.unknown_reason:
-        reason = f"Not known to be up to date: {bake.unknown_reason}"
+        reason = translated("Not known to be up to date: {reason}")
+        reason = reason.format(reason=bake.unknown_reason)
         sidebar.draw_wrapped(box, context, [reason], "QUESTION")
     else:
-        text = "Up to date at this frame" if bake.frame_range else "Up to date"
-        box.label(text=text, icon="CHECKMARK")
+        box.label(
+            text="Up to date at this frame" if bake.frame_range else "Up to date", icon="CHECKMARK"
+        )
 
 
 def unregister() -> None:
@@ -241,11 +255,12 @@ def _draw_view_hints(layout: UILayout, context: Context, bake_infos: list[BakeIn
     view, camera = context.space_data, context.scene.camera
     column = layout.column(align=True)
     is_live = session.is_live(view)
-    reason = "Live fields cover the picture" if is_live else ""
+    reason = translated("Live fields cover the picture") if is_live else ""
     if not is_live and view.shading.type in SHADING_WITHOUT_MATERIALS:
-        reason = "This view does not show materials"
+        reason = translated("This view does not show materials")
     elif not is_live and view.shading.type == "MATERIAL" and not view.shading.use_scene_lights:
-        reason = "This view has no lights of the scene" if context.scene.rosy.relight else ""
+        has_use = context.scene.rosy.relight
+        reason = translated("This view has no lights of the scene") if has_use else ""
     if reason:
         column.label(text=reason, icon="INFO")
         column.operator("rosy.show_here")
@@ -260,7 +275,9 @@ def _draw_view_transform_warning(layout: UILayout, scene: Scene) -> None:
     transform = scene.view_settings.view_transform
     if transform not in NEUTRAL_VIEW_TRANSFORMS:
         column = layout.column(align=True)
-        column.label(text=f"{transform} changes the colors", icon="ERROR")
+        column.label(
+            text=translated("{name} changes the colors").format(name=transform), icon="ERROR"
+        )
         button = column.operator("wm.context_set_enum", text="View Transform: Standard")
         button.data_path, button.value = "scene.view_settings.view_transform", "Standard"
 

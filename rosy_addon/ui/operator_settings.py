@@ -21,7 +21,7 @@ _INPUTS_BY_KIND = {
 _GUIDE_OF_INPUT = {"guide": "OBJECTS", "edges": "EDGES", "uv_map": "UV", "vectors": "ATTRIBUTE"}
 
 #: Texts that empty settings of the generator show.
-_PLACEHOLDERS = {"guide": "Selected", "uv_map": "Active", "vectors": "Attribute"}
+PLACEHOLDERS = {"guide": "Selected", "uv_map": "Active", "vectors": "Attribute"}
 
 
 def draw_settings(layout: UILayout, settings: Any, *names: str, **placeholders: str) -> None:
@@ -60,4 +60,4 @@ def draw_generator_settings(layout: UILayout, settings: Any) -> None:
         options = ["sharp_angle", *(name for name in options if name != "sharp_angle")]
     elif "sharp_angle" in options:
         options.remove("sharp_angle")
-    draw_settings(layout, settings, "kind", "degree", *inputs, *options, **_PLACEHOLDERS)
+    draw_settings(layout, settings, "kind", "degree", *inputs, *options, **PLACEHOLDERS)

@@ -58,8 +58,11 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, Panel):
             draw_progress(layout)
             return
         objects = stroke_objects(context.scene)
-        text = "Draw Strokes..." if settings.kind == "FILE" else "Draw Strokes"
-        new_row(layout, scale_y=1.5).operator("rosy.strokes", text=text, icon="GREASEPENCIL")
+        new_row(layout, scale_y=1.5).operator(
+            "rosy.strokes",
+            text="Draw Strokes..." if settings.kind == "FILE" else "Draw Strokes",
+            icon="GREASEPENCIL",
+        )
         if objects:
             layout.operator("rosy.strokes_remove", icon="TRASH")
             for obj in objects:

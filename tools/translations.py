@@ -17,6 +17,14 @@ import bpy
 
 ROOT = Path(__file__).resolve().parents[1]
 
+#: Blender's contexts of texts: that of most texts, which .po files leave out, and that of labels of operators.
+DEFAULT_CONTEXT, OPERATOR_CONTEXT = "*", "Operator"
+
+#: Numbers of characters of a label that fit into a sidebar of default width: beside a value, beside a value of
+#: the look (`look_panels.LONG_LABEL_FACTOR` of the width instead of Blender's 0.4), and beside a checkbox.
+#: They are measured in screenshots, for letters of mean width.
+LABEL_LENGTH, LOOK_LABEL_LENGTH, CHECKBOX_LENGTH = 15, 18, 19
+
 #: Arguments of layouts and dialogs that are shown, and functions whose last argument is translated.
 TEXT_ARGUMENTS = {"text", "title", "heading"}
 TRANSLATING_FUNCTIONS = {"translated", "Condition"}
@@ -35,14 +43,14 @@ msgstr ""
 
 def main() -> None:
     """Update all files, and print how many texts each of them lacks."""
-    keys = interface_texts()
+    limits = interface_texts()
     from rosy.rosy_addon.ui import translations
 
     for path in sorted(translations.FOLDER.glob("*.po")):
         old = translations.read_translations(path)
-        path.write_text(po_text(path.stem, keys, old), encoding="utf-8")
-        missing = sum(not old.get(key) for key in keys)
-        print(f"{path.relative_to(ROOT)}: {len(keys)} texts, {missing} without a translation")
+        path.write_text(po_text(path.stem, limits, old), encoding="utf-8")
+        missing = sum(not old.get(key) for key in limits)
+        print(f"{path.relative_to(ROOT)}: {len(limits)} texts, {missing} without a translation")
 
 
 def register_extension() -> ModuleType:
@@ -57,16 +65,22 @@ def register_extension() -> ModuleType:
     return module
 
 
-def interface_texts() -> list[tuple[str, str]]:
-    """Return the contexts and English texts of the extension, sorted by the texts."""
+def interface_texts() -> dict[tuple[str, str], int]:
+    """Return the contexts and English texts of the extension, sorted by the texts, with their limits.
+
+    The limit of a label in a panel is the number of characters of a translation that fit. That of others is 0.
+    """
     extension = register_extension()
     found = {*_class_texts(), *_preset_texts()}
+    limits: dict[tuple[str, str], int] = {}
+    for key, limit in _label_limits():
+        limits[key] = max(min(limit, limits.get(key, limit)), len(key[1]))
     extension.unregister()
     for folder in ("rosy_addon/ui", "operators"):
         for path in (ROOT / folder).glob("*.py"):
             found |= {*_source_texts(path)}
     is_text = {key for key in found if any(map(str.isalpha, key[1]))}
-    return sorted(is_text, key=lambda key: (key[1], key[0]))
+    return {key: limits.get(key, 0) for key in sorted(is_text, key=lambda key: (key[1], key[0]))}
 
 
 def _class_texts() -> Iterator[tuple[str, str]]:
@@ -83,18 +97,15 @@ def _class_texts() -> Iterator[tuple[str, str]]:
         properties,
         strokes_panel,
     )
-    from rosy.rosy_addon.ui.translations import DEFAULT_CONTEXT, OPERATOR_CONTEXT
 
     for cls in (*main_panel.CLASSES, *look_panels.CLASSES, *strokes_panel.CLASSES):
         yield DEFAULT_CONTEXT, cls.bl_label
     for cls in (*properties.CLASSES, *preferences.CLASSES):
         yield from _property_texts(cls, cls.bl_rna)
-    for cls in registration.CLASSES:
-        if issubclass(cls, bpy.types.Operator):
-            rna = getattr(bpy.ops.rosy, cls.bl_idname.partition(".")[2]).get_rna_type()
-            yield rna.translation_context, rna.name
-            yield DEFAULT_CONTEXT, rna.description
-            yield from _property_texts(cls, rna)
+    for cls, rna in _operators():
+        yield rna.translation_context, rna.name
+        yield DEFAULT_CONTEXT, rna.description
+        yield from _property_texts(cls, rna)
     for tool in registration.TOOLS:
         yield OPERATOR_CONTEXT, tool.bl_label
         yield DEFAULT_CONTEXT, tool.bl_description
@@ -107,14 +118,8 @@ def _class_texts() -> Iterator[tuple[str, str]]:
 
 
 def _property_texts(cls: type, rna: Any) -> Iterator[tuple[str, str]]:
-    """Yield the texts of the properties that RoSy gives a class, except those that are not shown."""
-    from rosy.rosy_addon.ui.translations import DEFAULT_CONTEXT
-
-    bases = [base for base in cls.__mro__ if base.__module__.startswith("rosy.")]
-    for name in {name for base in bases for name in inspect.get_annotations(base)}:
-        item = rna.properties.get(name)
-        if item is None or item.is_hidden or item.name in ("", item.identifier):
-            continue
+    """Yield the texts of the properties that RoSy gives a class."""
+    for item in _properties(cls, rna):
         yield item.translation_context, item.name
         yield DEFAULT_CONTEXT, item.description
         for option in item.enum_items_static if item.type == "ENUM" else ():
@@ -122,10 +127,46 @@ def _property_texts(cls: type, rna: Any) -> Iterator[tuple[str, str]]:
             yield DEFAULT_CONTEXT, option.description
 
 
+def _properties(cls: type, rna: Any) -> Iterator[Any]:
+    """Yield the properties that RoSy gives a class, except those that are not shown."""
+    bases = [base for base in cls.__mro__ if base.__module__.startswith("rosy.")]
+    for name in {name for base in bases for name in inspect.get_annotations(base)}:
+        item = rna.properties.get(name)
+        if item is not None and not item.is_hidden and item.name not in ("", item.identifier):
+            yield item
+
+
+def _label_limits() -> Iterator[tuple[tuple[str, str], int]]:
+    """Yield the labels of properties in the panels, and the numbers of characters that fit."""
+    from rosy.rosy_addon.compositor.look import Look
+    from rosy.rosy_addon.core.settings import Numbers, Switch, settings_of
+    from rosy.rosy_addon.ui import properties
+
+    for setting in settings_of(Look).values():
+        label = setting.panel_label or setting.label
+        length = CHECKBOX_LENGTH if isinstance(setting, Switch) else LOOK_LABEL_LENGTH
+        yield (DEFAULT_CONTEXT, label), length
+        for part in setting.parts if isinstance(setting, Numbers) else ():
+            yield (DEFAULT_CONTEXT, part), LABEL_LENGTH
+    groups = [(cls, cls.bl_rna) for cls in properties.CLASSES if cls is not properties.RosyLook]
+    for cls, rna in [*groups, *_operators()]:
+        for item in _properties(cls, rna):
+            length = CHECKBOX_LENGTH if item.type == "BOOLEAN" else LABEL_LENGTH
+            yield (item.translation_context, item.name), length
+
+
+def _operators() -> Iterator[tuple[type, Any]]:
+    """Yield the classes of operators, with Blender's descriptions."""
+    from rosy.operators import registration
+
+    for cls in registration.CLASSES:
+        if issubclass(cls, bpy.types.Operator):
+            yield cls, getattr(bpy.ops.rosy, cls.bl_idname.partition(".")[2]).get_rna_type()
+
+
 def _preset_texts() -> Iterator[tuple[str, str]]:
     """Yield the names and descriptions of the presets that come with RoSy."""
     from rosy.rosy_addon.preset_files import store
-    from rosy.rosy_addon.ui.translations import DEFAULT_CONTEXT
 
     for path in store.preset_files().values():
         preset = store.read_preset(path)
@@ -135,8 +176,6 @@ def _preset_texts() -> Iterator[tuple[str, str]]:
 
 def _source_texts(path: Path) -> Iterator[tuple[str, str]]:
     """Yield the constant texts that a file shows in layouts and dialogs."""
-    from rosy.rosy_addon.ui.translations import DEFAULT_CONTEXT, OPERATOR_CONTEXT
-
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         shown: list[ast.expr] = []
         context = DEFAULT_CONTEXT
@@ -158,15 +197,14 @@ def _source_texts(path: Path) -> Iterator[tuple[str, str]]:
 
 
 def po_text(
-    language: str, keys: list[tuple[str, str]], translations: dict[tuple[str, str], str]
+    language: str, limits: dict[tuple[str, str], int], translations: dict[tuple[str, str], str]
 ) -> str:
-    """Return the contents of the .po file of a language, given the contexts and texts and what is translated."""
-    from rosy.rosy_addon.ui.translations import DEFAULT_CONTEXT
-
+    """Return the contents of the .po file of a language, given `interface_texts` and what is translated."""
     parts = [HEADER.format(language=language)]
-    for key in keys:
+    for key, limit in limits.items():
         context, text = key
-        lines = [] if context == DEFAULT_CONTEXT else [f"msgctxt {_quoted(context)}"]
+        lines = [f"#. A label: up to {limit} characters"] if limit else []
+        lines += [] if context == DEFAULT_CONTEXT else [f"msgctxt {_quoted(context)}"]
         lines += [f"msgid {_quoted(text)}", f"msgstr {_quoted(translations.get(key, ''))}"]
         parts.append("\n".join(lines) + "\n")
     return "\n".join(parts)

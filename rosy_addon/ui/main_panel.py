@@ -59,6 +59,7 @@ def _draw_existing_field(layout: UILayout, context: Context, obj: Object) -> Non
     mesh = field_mesh(obj)
     box = layout.box().column(align=True)
     row = box.row()
+    row.use_property_split = False
     row.label(text=obj.name, icon="OUTLINER_OB_MESH")
     row.prop(obj.rosy, "include", text="Draw")
     has_attribute = mesh.rosy.attribute in mesh.attributes

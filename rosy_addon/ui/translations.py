@@ -18,8 +18,8 @@ from ..scene.files import EXTENSION_ID
 #: this name.
 FOLDER = Path(__file__).parent / "locale"
 
-#: Contexts of texts: that of most texts, which .po files leave out, and that of the labels of operators.
-DEFAULT_CONTEXT, OPERATOR_CONTEXT = "*", "Operator"
+#: Blender's context of most texts, which .po files leave out. Labels of operators have the context Operator.
+DEFAULT_CONTEXT = "*"
 
 #: A line of a .po file with a text. Without a keyword, the text continues that of the line above.
 LINE = re.compile(r'(?:(msgctxt|msgid|msgstr)\s+)?"((?:[^"\\]|\\.)*)"')

@@ -70,6 +70,21 @@ def test_settings_survive_off_and_on(with_field):
     assert with_field.data.rosy.degree == 6
 
 
+def test_the_interface_is_translated_while_the_extension_is_on():
+    view = bpy.context.preferences.view
+    before = view.language, view.use_translate_interface
+    view.language, view.use_translate_interface = "de_DE", True
+    translated = bpy.app.translations.pgettext_iface
+    try:
+        assert translated("Crispness") == "Schärfe"
+        assert translated("Bake Animation", "Operator") == "Animation backen"
+        switch_extension(False)
+        assert translated("Crispness") == "Crispness"
+    finally:
+        switch_extension(True)
+        view.language, view.use_translate_interface = before
+
+
 def test_nothing_outside_bpy_is_touched():
     assert not [entry for entry in sys.path if "rosy" in entry]
     assert not [name for name in sys.modules if name.startswith(("rosy_addon", "operators"))]

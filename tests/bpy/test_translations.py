@@ -43,20 +43,19 @@ def test_there_is_a_german_translation():
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
-def test_files_are_complete_and_have_no_other_texts(path, collected):
-    """After a change of a text, `make translations` updates the files, and shows what has no translation."""
+def test_files_have_all_texts_and_no_others(path, collected):
+    """After a change of a text, `make translations` updates the files. Texts may wait for their translation."""
     limits, files = collected
     assert len(limits) > 500
     assert path.read_text(encoding="utf-8") == files[path.name]
     messages = translations.read_translations(path)
     assert messages.keys() == limits.keys()
-    assert [text for text, translation in messages.items() if not translation] == []
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_translations_have_the_placeholders_of_the_texts(path):
     for (_, text), translation in translations.read_translations(path).items():
-        assert placeholders(translation) == placeholders(text), text
+        assert not translation or placeholders(translation) == placeholders(text), text
 
 
 def placeholders(text):

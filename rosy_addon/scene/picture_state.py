@@ -185,7 +185,7 @@ class SceneState:
             size=[] if camera is None else [camera.width, camera.height],
             camera="" if camera is None else digest(camera.view + 0.0, camera.projection + 0.0),
             output=output,
-            device="cpu" if is_relit else scene.rosy.device.lower(),
+            device="cpu" if is_relit or self._own_looks else scene.rosy.device.lower(),
             objects={name: instances.digest_pair() for name, instances in self._fields.items()},
             occluders={name: instances.digest_pair() for name, instances in occluders.items()},
             lights=lights,

@@ -74,6 +74,11 @@ def shadows(scene):
     scene.rosy.look.shadows = True
 
 
+def own_look_on_a_card(scene):
+    """Pictures of several looks are drawn by the processor."""
+    obj("Plain").rosy.preset, scene.rosy.device = "engraving", "GPU"
+
+
 def tone(scene):
     scene.rosy.look.tone, scene.rosy.tone_attribute = "attribute", "dark"
     add_tone()
@@ -324,6 +329,7 @@ TABLE = {
     "gain with hatching": (put("rosy.look.gain", 1.0), hatched, ""),
     "unit": (put("rosy.look.unit", "percent"), None, "the look was changed"),
     "own look": (put("Plain:rosy.preset", "engraving"), None, "the look was changed"),
+    "own look on a card": (put("frame_end", 200), own_look_on_a_card, ""),
     "shadows of a headlight": (put("rosy.look.shadows", True), None, ""),
     "tone attribute": (lambda scene: add_tone(0.2), tone, "field of 'Plain' was changed"),
     "colored attribute": (lambda scene: add_tone(0.2), colors, "field of 'Plain' was changed"),

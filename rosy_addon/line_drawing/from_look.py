@@ -14,6 +14,13 @@ EVEN_DISTANCE = 1.5
 HATCH_DISTANCE = 2.0
 
 
+#: The settings of strokes that a look sets. Soft streaks set neither the first three nor the pen.
+SETTINGS_OF_LOOK = (
+    *("unit", "spacing", "distance", "light", "layering", "swell", "overshoot"),
+    *("outline", "arrows", "singularity_dots", "singularity_size"),
+)
+
+
 def strokes_of_look(look: Any, style: StrokeStyle, pen: Pen) -> tuple[StrokeStyle, Pen]:
     """Return the style and the pen of strokes that look like the lines of a look.
 

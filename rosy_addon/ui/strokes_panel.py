@@ -2,7 +2,9 @@
 
 from bpy.types import Context, Panel, PropertyGroup, UILayout
 
+from ..compositor.look import is_hatched
 from ..core.settings import panel_settings, settings_of
+from ..line_drawing.from_look import SETTINGS_OF_LOOK
 from ..line_drawing.style import StrokeStyle
 from ..scene.stroke_objects import stroke_objects
 from . import job_status
@@ -18,11 +20,8 @@ STROKE_PANELS = {
 }
 
 
-#: Settings of the subpanels that strokes take from the look if *From Look* is on.
-OF_LOOK = {
-    *("light", "layering", "swell", "overshoot", "arrows"),
-    *("singularity_dots", "singularity_size", "ink_color", "outline_color"),
-}
+#: Settings that strokes take from the look if *From Look* is on.
+OF_LOOK = {*SETTINGS_OF_LOOK, "ink_color", "outline_color"}
 
 
 class VIEW3D_PT_rosy_strokes(SidebarPanel, Panel):
@@ -41,9 +40,11 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, Panel):
             column.prop(settings, "follow")
         column.separator()
         draw_settings(column, settings, "from_look", "hidden")
-        if not settings.from_look:
+        if not (settings.from_look and is_hatched(context.scene.rosy.look)):
             spacing = "spacing" if settings.unit == "pixels" else "distance"
-            draw_settings(column, settings, "unit", spacing, "width", "outline")
+            draw_settings(column, settings, "unit", spacing, "width")
+        if not settings.from_look:
+            draw_settings(column, settings, "outline")
         for title, names in STROKE_PANELS.items():
             if settings.from_look:
                 names = tuple(name for name in names if name not in OF_LOOK)

@@ -4,11 +4,12 @@ import re
 
 import numpy as np
 import pytest
+from shapes import instance_of, torus
 
 import rosy_addon as rf
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import pixel_look
-from rosy_addon.line_drawing.from_look import strokes_of_look
+from rosy_addon.line_drawing.from_look import SETTINGS_OF_LOOK, strokes_of_look
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen
 from rosy_addon.projection.camera import orthographic_camera
@@ -25,6 +26,15 @@ def test_strokes_and_pictures_have_the_same_lengths(width, factor):
     assert style.outline * pen.width == pytest.approx(2 * factor)
     assert style.overshoot == pytest.approx(3 * factor)
     assert (style.light, style.swell, style.layering) == ("lamp", 1.0, INK.layering)
+
+
+def test_the_panel_knows_which_settings_a_look_sets():
+    look = INK.with_settings({"unit": "scene", "arrows": 9.0, "singularity_dots": "all"})
+    look = look.with_settings({"singularity_size": 5.0, "layering": 0.1})
+    instance = instance_of(torus(12, 6), 4, "axis")
+    style, _ = strokes_of_look(pixel_look(look, CAMERA, [instance]), StrokeStyle(), Pen())
+    changed = {name for name, value in vars(style).items() if value != getattr(StrokeStyle(), name)}
+    assert changed == {*SETTINGS_OF_LOOK}
 
 
 def test_soft_streaks_set_neither_spacing_nor_ink():

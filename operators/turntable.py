@@ -26,7 +26,7 @@ SIDE = {"subtype": "PIXEL", "default": 512, "min": 16, "max": 8192}
 
 
 class ROSY_OT_turntable(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, ExportHelper):
-    """Render a turntable video of the active mesh with its field, with its look"""
+    """Render a turntable video of the active mesh with its field and its look"""
 
     bl_label = "Turntable"
     bl_options = {"REGISTER"}

@@ -221,9 +221,8 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
     if look.unit == "scene":
         unit_size = look.unit_size or pixel
     look = replace(look, method="sheets", anchor="surface", guiding_angle=0.0, supersampling=1)
-    scale = max(
-        unit_size / step, min(1.0 / look.line_width, 1.0)
-    )  # cells of noise are at least one step
+    # Cells of noise are at least one step.
+    scale = max(unit_size / step, min(1.0 / look.line_width, 1.0))
     return replace(_scaled_pixel_look(look, scale, unit_size, drift), is_on_surface=True)
 
 

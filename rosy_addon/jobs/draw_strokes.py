@@ -17,7 +17,6 @@ from ..line_drawing.pipeline import StrokeDrawing
 from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
-from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from ..scene.files import absolute_path
@@ -25,12 +24,7 @@ from ..scene.look_inputs import ReadRequest, nonfinite_policy
 from ..scene.look_properties import own_presets, read_look
 from ..scene.read_view import lights_for, scene_depsgraph
 from ..scene.scene_reader import SceneData, read_scene
-from ..scene.stroke_objects import (
-    edited_strokes,
-    read_pen,
-    read_stroke_style,
-    store_strokes,
-)
+from ..scene.stroke_objects import read_pen, read_stroke_style, store_strokes
 from ..worker.job import Call, Step, Steps, job
 
 
@@ -130,14 +124,18 @@ def draw_strokes(
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
     scene_data = read_scene(depsgraph, objects, ReadRequest(nonfinite_policy(scene)), BAKE_CACHE)
     BAKE_CACHE.evict_over_limit()
+    look = read_look(scene.rosy) if settings.from_look else None
     notes = [*scene_data.warnings]
-    if style is None and settings.from_look and read_look(scene.rosy).tone != "light":
-        notes.append("strokes follow the light, not the tone of the look")
-    if style is None and settings.from_look and any(own_presets(scene, scene_data.objects)):
-        notes.append("strokes follow the look of the scene, not those of objects")
+    if look is not None and style is None:
+        if look.tone != "light":
+            notes.append("strokes follow the light, not the tone of the look")
+        if any(own_presets(scene, scene_data.objects)):
+            notes.append("strokes follow the look of the scene, not those of objects")
     is_following = kind == "CURVES" and settings.follow
     followed = _followed_instance(scene_data) if is_following else None
-    made = _styled(scene, view, scene_data.instances)
+    made = read_stroke_style(settings), read_pen(settings)
+    if look is not None:
+        made = strokes_of_look(pixel_look(look, view, scene_data.instances), *made)
     made = made if adjust is None else adjust(*made)
     style, pen = (given or default for given, default in zip((style, pen), made, strict=True))
     lights = lights_for(scene, depsgraph, style, scene_data.instances)
@@ -152,23 +150,12 @@ def draw_strokes(
     # The strokes move with the drawn object, if there is only one.
     parent = scene_data.objects[0] if len(scene_data.objects) == 1 else None
     vertex_count = 0 if followed is None else len(followed.surface.vertices)
-    edited = edited_strokes(scene, kind, view.name)
-    obj = store_strokes(scene, kind, curves, view.name, parent, collection, vertex_count)
+    output = curves, view.name, parent, collection, vertex_count
+    obj, edited = store_strokes(scene, kind, *output)
     notes += _notes(scene, obj, style)
     if edited is not None:
         notes.append(f"'{edited.name}' was edited and stays: the new strokes are '{obj.name}'")
     return StrokeResult(view.name, drawing, obj, notes=tuple(notes))
-
-
-def _styled(
-    scene: bpy.types.Scene, camera: Camera, instances: Sequence[MeshInstance]
-) -> tuple[StrokeStyle, Pen]:
-    """Return the style and the pen that the settings of a scene, and its look, describe."""
-    settings = scene.rosy.strokes
-    style, pen = read_stroke_style(settings), read_pen(settings)
-    if not settings.from_look:
-        return style, pen
-    return strokes_of_look(pixel_look(read_look(scene.rosy), camera, instances), style, pen)
 
 
 def _followed_instance(scene_data: SceneData) -> MeshInstance:

@@ -86,7 +86,7 @@ def store_strokes(
     owner: Object | None = None,
     collection: Collection | None = None,
     vertex_count: int = 0,
-) -> Object:
+) -> tuple[Object, Object | None]:
     """Store strokes in an object. They replace the strokes of the same kind from the same camera.
 
     Strokes that the user has edited are not replaced; see `edited_strokes`. If an error is raised, the scene is not changed.
@@ -110,8 +110,10 @@ def store_strokes(
 
     Returns
     -------
-    bpy.types.Object
+    obj : bpy.types.Object
         The object with the strokes.
+    edited : bpy.types.Object or None
+        The object with edited strokes, which was kept.
     """
     name, first_frame = f"RoSy Strokes {camera}", min(scene.frame_start, scene.frame_current)
     final_names: dict[ID, str] = {}
@@ -148,7 +150,7 @@ def store_strokes(
     else:
         stroke_data.stop_following(obj)
     _store_record(scene, kind, camera, obj)
-    return obj
+    return obj, edited
 
 
 def stroke_objects(scene: Scene) -> list[Object]:

@@ -1,7 +1,7 @@
 """The main panel: make a field, bake its picture and look at it."""
 
 import bpy
-from bpy.types import Context, Menu, Object, Panel, Scene, UILayout
+from bpy.types import Context, Menu, Object, Panel, Scene, SpaceView3D, UILayout
 
 from ..compositor.look import has_flow, is_hatched
 from ..gpu.select import automatic_device
@@ -255,13 +255,7 @@ def _draw_view_hints(layout: UILayout, context: Context, bake_infos: list[BakeIn
     """If this view does not show baked pictures, draw buttons that make them visible."""
     view, camera = context.space_data, context.scene.camera
     column = layout.column(align=True)
-    is_live = session.is_live(view)
-    reason = translated("Live fields cover the picture") if is_live else ""
-    if not is_live and view.shading.type in SHADING_WITHOUT_MATERIALS:
-        reason = translated("This view does not show materials")
-    elif not is_live and view.shading.type == "MATERIAL" and not view.shading.use_scene_lights:
-        has_use = context.scene.rosy.relight
-        reason = translated("This view has no lights of the scene") if has_use else ""
+    reason = _hidden_picture(view, context.scene)
     if reason:
         column.label(text=reason, icon="INFO")
         column.operator("rosy.show_here")
@@ -269,6 +263,18 @@ def _draw_view_hints(layout: UILayout, context: Context, bake_infos: list[BakeIn
     camera_names = [bake.camera for bake in bake_infos]
     if not in_camera_view and camera is not None and camera.name in camera_names:
         column.operator("view3d.view_camera", text="Look Through the Camera")
+
+
+def _hidden_picture(view: SpaceView3D, scene: Scene) -> str:
+    """Return why a view does not show pictures as renders do; empty if it does."""
+    if session.is_live(view):
+        return translated("Live fields cover the picture")
+    if view.shading.type in SHADING_WITHOUT_MATERIALS:
+        return translated("This view does not show materials")
+    has_no_lights = view.shading.type == "MATERIAL" and not view.shading.use_scene_lights
+    if has_no_lights and scene.rosy.relight:
+        return translated("This view has no lights of the scene")
+    return ""
 
 
 def _draw_view_transform_warning(layout: UILayout, scene: Scene) -> None:

@@ -301,8 +301,8 @@ class ViewportSession:
             self._schedule_redraw(0.0)
             return None
         camera = camera_of_view(context.region, context.region_data)
-        frame = view3d.camera_frame(context, camera)
-        if frame is not None and look.unit != "pixels":
+        frame = None if look.unit == "pixels" else view3d.camera_frame(context, camera)
+        if frame is not None:
             # The finished picture is what the camera shows.
             camera = replace(camera, picture_share=(frame[1][0] - frame[0][0]) / 2)
             look = in_percent(look, render_size(context.scene, context.scene.rosy.percentage)[0])

@@ -33,6 +33,10 @@ TOLERANCE = 1e-10
 #: the fraction of pi / N up to which the angle at an edge needs no reduction.
 MAX_ATTEMPTS, ANGLE_MARGIN = 24, 0.8
 
+#: Largest factor of a resistance after several attempts. With more, a sum of conductances in floating point loses the
+#: smallest ones.
+MAX_RESISTANCE = 1e15
+
 #: An attempt changes the angles at all edges within this number of edges of an edge with too large an angle.
 REACH = 16
 
@@ -94,13 +98,15 @@ def turning_angles(
         drop = least_angles(triangles.graph, degree, required, loops, present_between)
     between, to_center = triangles.graph.conductance * drop, triangles.turns_to_centers(drop)
     limit, angle = np.pi / degree, triangles.on_faces(between, to_center)
+    resistance = np.ones(len(angle))
     for attempt in range(MAX_ATTEMPTS):
         if np.abs(angle + present).max(initial=0.0) < limit:
             break
         factor = added_resistance(angle, present, limit)
         edges = np.flatnonzero(factor > 1)
-        if not len(edges):  # only the present angles are too large
-            break
+        resistance *= factor
+        if not len(edges) or resistance.max() > MAX_RESISTANCE:
+            break  # only the present angles are too large, or no angles are small enough
         triangles = triangles.with_resistance(factor)
         with progress(1 - 0.2 * 0.5**attempt, 1 - 0.1 * 0.5**attempt):
             changed = _least_angles_near(triangles.graph, required, loops, between, edges)

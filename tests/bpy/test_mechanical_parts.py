@@ -155,3 +155,14 @@ def test_steps_of_voxels_are_not_followed(make):
     part = make()
     part = modified(part, "REMESH", mode="VOXEL", voxel_size=max(part.dimensions) / 100)
     assert measured(part, "form")[0] <= 0.2 * measured(part, "features")[0]
+
+
+def test_angles_that_are_too_large_end_the_search():
+    """Around the teeth, a field without singularities would turn too far. Resistances rose until numbers overflowed."""
+    surface = mesh_surface(gear().data)
+    starts, random = surface.face_start, np.random.default_rng(5)
+    faces = np.split(surface.corner_vertex, starts[1:-1])
+    turned = np.concatenate([np.roll(face, random.integers(len(face))) for face in faces])
+    with np.errstate(over="raise", invalid="raise"):
+        field = generate(build_surface(surface.vertices, turned, starts), "smoothest", 4)
+    assert np.isfinite(field.vectors).all()

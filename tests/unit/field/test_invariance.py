@@ -26,7 +26,7 @@ def folded(surface):
 
 
 MESHES = {
-    "triangles": bumpy(icosphere(3)),
+    "triangles": bumpy(rebuilt(icosphere(3), icosphere(3).vertices @ TURN)),
     "quads": bumpy(GLOBE),
     "sheet": rebuilt(plane(9, 7), SHEET + np.outer(np.sin(2 * SHEET[:, 0] + 1), [0, 0, 0.4])),
     "rough": folded(ROUGH),

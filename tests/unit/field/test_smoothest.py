@@ -133,8 +133,9 @@ def test_the_mirror_image_has_the_mirrored_field(degree):
     assert np.degrees(angle_differences(BALL, actual, expected, degree).max()) < 0.1
 
 
-@pytest.mark.parametrize("degree", range(1, 7))
+@pytest.mark.parametrize("degree", [1, 2, 3, 6])
 def test_a_mirror_symmetric_surface_has_a_symmetric_field(degree):
+    """In degrees 4 and 5, an asymmetric field has 4 % less energy on this head."""
     surface = symmetric_head()
     vectors = smoothest_field(surface, degree).vectors
     distance = cdist(surface.face_center, surface.face_center @ MIRROR)

@@ -1,10 +1,13 @@
 """Planes in front of cameras that only camera rays hit. Backdrops and keys (legends) are such planes."""
 
+from contextlib import suppress
+
 import bpy
 import numpy as np
 from bpy.types import Material, Object, PropertyGroup, Scene
 from mathutils import Matrix
 
+from ..core.errors import RosyError
 from ..projection.camera import Camera
 from .cameras import FRAME_CAMERAS, camera_of_object
 from .datablocks import Track, delete_owned, rollback_on_error
@@ -125,13 +128,15 @@ OVERSIZE = 1.5
 def update_backdrops(scene: Scene) -> None:
     """Replace the backdrops of a scene by the ones that its settings ask for.
 
-    They have the color of `backdrop_color`, and there is one for each of `pictured_cameras`.
+    They have the color of `backdrop_color`, and there is one for each of `pictured_cameras`, unless the camera has been
+    made panoramic, or sheared by a parent, after the bake.
     """
     remove_camera_planes(scene, BACKDROP_TAG)
     paper = backdrop_color(scene, read_look(scene.rosy))
     if paper is not None:
         for camera in pictured_cameras(scene):
-            _add_backdrop(scene, camera, paper)
+            with suppress(RosyError):
+                _add_backdrop(scene, camera, paper)
 
 
 def _add_backdrop(scene: Scene, camera: Object, paper: np.ndarray) -> None:

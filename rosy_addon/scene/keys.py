@@ -1,6 +1,7 @@
 """Keys (legends) on a plane in front of a camera: color scale, kinds of singularities, scale bar, caption."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 
@@ -63,10 +64,8 @@ def update_keys(scene: Scene) -> None:
         return
     triangles = cache(text_triangles)
     for camera, record in camera_planes.pictured_cameras(scene).items():
-        try:
+        with suppress(RosyError):  # the camera was made panoramic after the bake
             _add_key(scene, camera, record, triangles)
-        except RosyError:
-            continue  # the camera was made panoramic after the bake
 
 
 def _add_key(scene: Scene, camera: Object, record: PropertyGroup, triangles: TextShapes) -> None:

@@ -4,6 +4,7 @@ This includes what RoSy made, and what a user or a script does behind RoSy's bac
 """
 
 import math
+from glob import escape
 
 import bmesh
 import bpy
@@ -290,8 +291,11 @@ def save_and_reopen(monkey: Monkey) -> None:
         monkey.note(f"    not saved: {error}")
         return
     bpy.ops.wm.open_mainfile(filepath=path)
-    # Blender does not save settings of tools, reads what is linked again, and makes paths relative.
-    allowed = ("*/tool_settings/*", "*@*.blend*", "cameras/*/custom_filepath")
+    # Blender does not save settings of tools, reads what is linked again, overridden meshes too, and makes paths relative.
+    overrides = [
+        f"meshes/{escape(mesh.name)}/*" for mesh in bpy.data.meshes if mesh.override_library
+    ]
+    allowed = ("*/tool_settings/*", "*@*.blend*", "cameras/*/custom_filepath", *overrides)
     expect_none(changes(before, fingerprint(), allowed), "the saved file differs")
 
 

@@ -198,6 +198,8 @@ FIELD = (
 FURTHER = {
     "occlusion": ("meshes/*/attributes/Occlusion",),
     "bake_texture": ("meshes/SELECTED/*", "context"),
+    # Strokes that the user has edited become the user's.
+    "strokes": ("*/RoSy *",),
     # What a modifier of RoSy that the user has applied left in a mesh.
     "remove": ("meshes/*/materials", "objects/*/slots", "meshes/*/attributes/material_index"),
 }

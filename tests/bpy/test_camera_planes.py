@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-from objects import add_camera, aim
+from objects import add_camera, aim, link
 from rosy.rosy_addon.annotation.key_contents import PictureKey
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.color import from_hex, to_linear
@@ -224,6 +224,16 @@ def transparent_renders(scene):
 def test_what_shows_through_has_no_backdrop(colored, change):
     change(colored)
     bake(colored)
+    assert not planes("backdrop")
+
+
+def test_a_sheared_camera_has_no_backdrop(colored):
+    """Its parent was scaled after the bake. The switch of the panel ended in a traceback."""
+    bake(colored)
+    parent = link(bpy.data.objects.new("parent", None))
+    parent.scale, colored.camera.parent = (1, 1, 3), parent
+    bpy.context.view_layer.update()
+    update_backdrops(colored)
     assert not planes("backdrop")
 
 

@@ -34,11 +34,11 @@ LEAST_SHARE = 0.003
 #: or if the mesh is nearly flat or round.
 LEAST_STRENGTH = 1e-3
 
-#: Curvature below which a surface counts as flat, relative to that of a sphere of the same area.
+#: Curvature below which a surface counts as flat, relative to the curvature of a sphere of the same area.
 FLAT_CURVATURE = 0.02
 
-#: Largest multiple k of the degree for criterion 6. It is a multiple of 3 and of 4. So for each degree N, the directions
-#: along the edges do not cancel for some k, on the squares of a cube and on the triangles of a tetrahedron.
+#: Largest multiple k of the degree for criterion 6. It is a multiple of 3 and of 4. So for each degree N, there is a k
+#: for which the directions along the edges do not cancel on the squares of a cube, and one for triangles.
 MAX_MULTIPLE = 12
 
 #: Smallest angle between the faces of a crease, in radians: the angle of sharp edges of *Features*.

@@ -284,10 +284,10 @@ def remove_leftovers(folder: str | os.PathLike[str]) -> None:
 
 
 def _own_prefix() -> str:
-    """Return the start of the names of temporary files that are made on this machine since its start.
+    """Return the prefix of the names of all temporary files that this machine has made since it was booted.
 
-    It has a hash of the ID that Linux has made at its start, which is the same in all containers, or else of
-    the name of the machine.
+    It contains a hash: on Linux of the boot ID, which is the same in all containers, elsewhere of the name of the
+    machine.
     """
     identity = platform.node()
     with suppress(OSError):

@@ -24,7 +24,7 @@ LABEL = "spacing lines"
 #: largest value.
 SMOOTHING_STEPS, STEP_GROWTH, MAX_SMOOTHING_STEPS = 8, 1.5, 100
 
-#: Weight of the old value in a smoothing step, relative to that of all neighbors. It damps oscillations.
+#: Weight of the old value in a smoothing step, relative to the total weight of all neighbors. It damps oscillations.
 INERTIA = 0.3
 
 #: A level is coarsened only if it has more nodes than this, and if the number of nodes shrinks by at least

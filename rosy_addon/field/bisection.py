@@ -37,8 +37,8 @@ class BisectionTree:
     leaf_vertex : (L, 3) int32 ndarray
         Vertices of the leaves. Midpoints of edges are numbered after the given vertices.
     leaf_weights : (L, 3, 3) float32 ndarray
-        Barycentric coordinates of the corners of each leaf in its root: those of corner k are in row k of
-        its 3 x 3 matrix. They are exact.
+        Barycentric coordinates of the corners of each leaf in its root, without rounding errors. Row k of the
+        3 x 3 matrix of a leaf is for its corner k.
     vertices : (V, 3) float64 ndarray
         Positions of all vertices.
     """

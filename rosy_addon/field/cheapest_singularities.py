@@ -20,7 +20,7 @@ from .sparse_matrix import CSRMatrix, from_edges
 from .surface import Surface
 from .turning_angles import least_angles, potential_solver
 
-#: Tolerance of the eigenvector whose singularities are moved then.
+#: Tolerance of the eigenvector whose singularities are the first candidates.
 START_TOLERANCE = 1e-5
 
 #: Largest number of rounds in which singularities move to neighboring vertices.
@@ -40,7 +40,7 @@ MIN_SHARE = 0.05
 def cheapest_singularities(
     surface: Surface, degree: int, vertex: np.ndarray, index: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Add the singularities that a field needs in addition to given ones, where it stays smoothest.
+    """Add the singularities that a field needs besides given ones, at the vertices where they add least energy.
 
     Parameters
     ----------
@@ -60,8 +60,8 @@ def cheapest_singularities(
     ------
     RosyError
         If a vertex cannot be singular (at a border, or not in the mesh) or is given twice, if there are too
-        few faces around it for its index, if there is no other vertex for what is missing, or if no face has
-        an area.
+        few faces around it for its index, if no vertex is left for the missing singularities, or if no
+        face has an area.
     """
     degree = check_degree(degree)
     if not surface.face_frames[0].any():
@@ -109,11 +109,11 @@ def _spread(graph: FaceGraph, given: np.ndarray) -> np.ndarray:
 def _settled(
     graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray, is_taken: np.ndarray
 ) -> np.ndarray:
-    """Return the (n,) int64 indices of added singularities after moving them to where they add least energy.
+    """Move added singularities until the energy no longer decreases. Return their indices at all nodes, (n,) int64.
 
-    `given` and `added` hold the (n,) indices of the given singularities, which stay, and of the added ones
-    before they are moved. The index is 0 at nodes without a singularity. `is_taken` says of each node whether
-    no singularity can be added there: no added singularity stays there, if possible.
+    `given` and `added` hold the (n,) indices of the given singularities, which stay, and of the added ones before they
+    are moved. The index is 0 at nodes without a singularity. `is_taken`, (n,) bool, marks the nodes at which no
+    singularity may be added. Added singularities that are there leave them, if possible.
     """
     if not added.any():
         return added
@@ -159,9 +159,10 @@ class _Neighbors:
     ) -> np.ndarray:
         """Return (n,) int64 indices of the added singularities after one round of moves.
 
-        Singularities whose move to a neighbor reduces the energy are moved to the best neighbor. Added
-        singularities at a taken node must leave it, by one unit in each round, and are moved first: to a node
-        without a singularity of the same sign, else out over the border, else to any other node.
+        A singularity is moved to the neighbor at which the energy is least, if this reduces the energy. Added
+        singularities at a taken node are moved first, by one unit of the index in each round, even if this adds
+        energy. They move to a free neighbor that has no added singularity of the same sign. If there is none, they
+        leave over the border, else move to another free neighbor, else to a taken one.
 
         Parameters
         ----------

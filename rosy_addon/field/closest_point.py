@@ -87,8 +87,8 @@ class _ClosestSearch:
         self.origin, self.top = low.min(axis=0), high.max(axis=0)
         extent = self.top - self.origin
         longest = max(float(extent.max()), 1e-300)
-        # Choose the cell size so that the surface passes through about CELLS_PER_TRIANGLE * T cells. Its area
-        # is estimated as that of a cube with six sides around it.
+        # Choose the cell size so that the surface passes through about CELLS_PER_TRIANGLE * T cells. The area of
+        # the surface is estimated by the area of its bounding cube.
         self.cell_size = longest / max(np.sqrt(CELLS_PER_TRIANGLE * len(self.corners) / 6), 1)
         self.shape = np.maximum((extent / self.cell_size).astype(np.int64) + 1, 1)
         self.max_ring = int(self.shape.max()) + 1
@@ -165,7 +165,7 @@ class _ClosestSearch:
     def update(self, owner: np.ndarray, candidate: np.ndarray) -> None:
         """Update the results, given (m,) pairs of a point and a candidate for its closest triangle.
 
-        Element i of `owner` is the index of a point, and element i of `candidate` that of a triangle.
+        Pair i consists of the point with the index ``owner[i]`` and the triangle with the index ``candidate[i]``.
         """
         for block in row_blocks(len(owner), MAX_PAIRS):
             point, triangle = owner[block], candidate[block]

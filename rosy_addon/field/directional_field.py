@@ -35,12 +35,12 @@ from .symmetry import FieldSymmetry
 #: text files, gives errors about 100 times smaller.
 ANGLE_TOLERANCE_DEG, LENGTH_TOLERANCE = 1.0, 0.01
 
-#: Two directions count as opposite up to this angle, in radians. In fields of others, the lines of a cross have
-#: angles of 30 degrees or more.
+#: Largest angle between a direction and the reverse of another at which the two count as opposite, in radians. In
+#: fields that other programs made, the two lines of a cross meet at 30 degrees or more.
 OPPOSITE_TOLERANCE = np.radians(10)
 
-#: Largest fraction of the rows with opposite directions at which pairs are one direction for each line of a
-#: cross. In a field of degree 2 nearly all rows have opposite directions; here are exceptions at needle faces.
+#: Rows of two directions are read as crosses if the two are opposite in at most this fraction of the rows. In a field
+#: of degree 2, they are opposite in nearly all rows; in files of crosses, only at some needle faces.
 MAX_OPPOSITE_SHARE = 0.01
 
 #: Smallest modulus of a harmonic C_j that is kept (C_0 is about 1). Smaller ones are rounding
@@ -208,7 +208,7 @@ def direction_coordinates(surface: Surface, field: RosyField) -> np.ndarray:
 
 
 def stored_directions(surface: Surface, field: RosyField) -> np.ndarray:
-    """Return the (F, N, 3) directions to store for a field: those from which it was made, if it has them."""
+    """Return the (F, N, 3) directions to store for a field: `source_directions` if present, else its directions."""
     rows = field.source_directions
     return field_directions(surface, field) if rows is None else rows
 

@@ -1,4 +1,4 @@
-"""Make guides along salient edges, except edges with steps, as voxel remeshing makes them."""
+"""Make guides along salient edges, but not along edges in steps, which voxel remeshing makes."""
 
 from functools import partial
 
@@ -12,9 +12,9 @@ from .representation import edge_unfolding, power, to_representation
 from .sparse_matrix import from_edges
 from .surface import Surface
 
-#: Distance along edges over which their directions are averaged, relative to the size of the surface. With half of it,
-#: the steps of voxels of 1 % are followed (572 singularities on a tee); with twice, some edges at 45 degrees of a part
-#: that is remeshed with quads are not.
+#: Distance along edges over which their directions are averaged, relative to the size of the surface. With half of this
+#: distance, fields follow the steps of voxels of 1 % (572 singularities on a tee). With twice the distance, they do not
+#: follow some edges of a part that is remeshed with quads, whose edges are at 45 degrees.
 JAG_LENGTH = 0.01
 
 #: A guide is removed if N times its angle from the average has a smaller cosine than `MIN_COSINE`, or if the length
@@ -32,13 +32,13 @@ TOLERANCE, MAX_ITERATIONS = 1e-2, 100
 
 
 def coherent_edge_guides(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
-    """Make guides along edges, on their faces, without guides that contradict the other edges around them.
+    """Make guides along edges, on their faces. Remove guides whose directions differ from the edges around them.
 
-    Voxel remeshing, for example, turns a sharp edge of a part into steps. Their directions say nothing about
-    the part, and a field along them has a pair of singularities at each step.
+    Voxel remeshing, for example, turns a sharp edge into steps. The directions of the steps are not the direction of
+    the edge, and a field along them has a pair of singularities at each step.
 
-    The guides are averaged over the distance `JAG_LENGTH`, along the faces that touch the edges, and a guide
-    is removed if the average is short or points elsewhere. Faces are unfolded at their common edges, so that
+    The guides are averaged over the distance `JAG_LENGTH`, along the faces that touch the edges. A guide is removed
+    if the average is short or has another direction. Faces are unfolded at their common edges, so that
     the corner of a box does not count as a contradiction for degree 4. Guides on faces larger than the
     distance are kept.
 
@@ -68,7 +68,7 @@ def coherent_edge_guides(surface: Surface, ends: np.ndarray, degree: int) -> np.
     number = np.cumsum(touches) - 1
     source, target = number[surface.corner_face[a]], number[surface.corner_face[b]]
     mass = np.where(z != 0, surface.face_area, 0.0)[touches]
-    # A term that is only a rounding error makes the equations of faces without edges to others solvable.
+    # A tiny term keeps the diagonal positive at faces without an edge to another of these faces.
     stiffness = np.bincount(np.concatenate([source, target]), np.tile(weight, 2), len(mass))
     diagonal = mass + stiffness + np.finfo(float).eps
     transport = power(edge_unfolding(surface, a, b), degree)

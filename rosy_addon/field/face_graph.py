@@ -100,7 +100,7 @@ class FaceGraph:
 
     @property
     def can_be_singular(self) -> np.ndarray:
-        """(n,) bool: whether the vertex of each node has an index: its faces are connected around it, all of them.
+        """(n,) bool: whether the field may be singular at each node: all faces at its vertex form one closed fan.
 
         `singularities.find_singularities` finds indices at the same vertices.
         """
@@ -123,10 +123,10 @@ class FaceGraph:
         return np.where(self.is_interior, np.rint(degree * turns), 0).astype(np.int64)
 
     def index_range(self, degree: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the (n,) float64 least and largest index of a field at each interior node, in units of 1 / N.
+        """Return the smallest and the largest possible index at each interior node, (n,) float64, in units of 1 / N.
 
-        From face to face the field turns by less than pi / N, so around a node with k faces by less than k pi / N.
-        `degree` is N.
+        From one face to the next, the field turns by less than pi / N. So around a node with k faces, it turns by less
+        than k pi / N. `degree` is N.
         """
         half = np.bincount(self.corner_node, minlength=self.node_count) / 2
         flat = self.defect * degree / (2 * np.pi)
@@ -328,9 +328,9 @@ class TriangleGraph:
         return (direction - self._turns_in_faces(angle, to_center))[first]
 
     def _turns_in_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
-        """Return (T,) angles, in radians, from the direction of a triangle's face to that of the triangle.
+        """Return (T,) angles, in radians, from the direction of each face to the directions of its triangles.
 
-        The parameters are those of `on_faces`: turning angles (M,), and turns to the centroids (T,).
+        The parameters are as in `on_faces`: turning angles (M,), and turns to the centroids (T,).
         """
         face, inner = self.triangle_face, slice(self.face_edge_count, None)
         source, target = self.graph.source[inner], self.graph.target[inner]
@@ -365,8 +365,9 @@ def triangle_graph(faces: FaceGraph) -> TriangleGraph:
     corner, face = surface.triangles, surface.triangle_face
     cotangent, area = _cotangents(surface.vertices[surface.triangle_vertex])
     tail, head = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
-    # The corners of a triangle are in the order of the face, so that the tail of one side has a larger number than the
-    # head. It is the last side of the face, or divides the triangle from its parent. Each diagonal has both directions.
+    # The corners of a triangle are in the order of the face. So on one of its three sides, the tail has a larger number
+    # than the head: the last side of the face, or the diagonal to the parent. The other triangle at a diagonal has it
+    # in the opposite direction.
     is_outer = head == surface.next_corner[tail]
     outer, down = np.flatnonzero(is_outer), np.flatnonzero(~is_outer & (tail < head))
     up = np.flatnonzero(~is_outer & (tail > head))

@@ -29,7 +29,7 @@ from .unfolding import unfolded
 SCALES = (0.01, 0.02, 0.04, 0.08)
 
 #: The smallest of these distances is used at which noise rotates half of the directions by less than this
-#: angle, in radians. The rotation is measured by adding random noise as strong as that of the mesh.
+#: angle, in radians. The rotation is measured by adding random noise, as strong as the noise of the mesh.
 MAX_TURN = np.radians(6)
 
 #: Ratio of curvature to the curvature of noise at which the confidence in a direction is 1/2.
@@ -108,7 +108,7 @@ def form(surface: Surface, degree: int) -> RosyField:
         field = guided_field(surface, degree, guides, weight, at_edge, FIELD_TOLERANCE)
     if flat is original:
         return field
-    # All members are rotated alike, into the plane of a face on either side.
+    # Transport the vectors to the planes of the original faces, which may have the opposite orientation.
     source, target = surface.face_normal, original.face_normal
     side = np.copysign(1.0, dot(source, target))
     vectors = transport(field.vectors, source, side[:, None] * target)
@@ -160,11 +160,12 @@ def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray
 def _agreement(
     measured: NoisyCurvature, degree: int, guides: np.ndarray, edge_guides: np.ndarray
 ) -> np.ndarray:
-    """Return (F,) float64: how far guides agree with salient edges near them, from 0 to 1.
+    """Return (F,) float64: how well guides agree with salient edges near them, from 0 (to be ignored) to 1.
 
     The direction of the edges is continued smoothly over the surface, with a modulus that falls off over the
-    distance `EDGE_REACH`. Guides that contradict it are ignored. Otherwise the field would have to rotate
-    between the edge and the guides, and both ways around are equally good halfway between two members.
+    distance `EDGE_REACH`. Guides near an edge that contradict this direction are ignored. Otherwise the field would
+    have to rotate between the edge and the guides. If a guide is halfway between two members, it is arbitrary whether
+    the field rotates to the left or to the right.
 
     Parameters
     ----------

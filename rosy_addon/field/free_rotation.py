@@ -1,17 +1,18 @@
-"""Choose the rotation of a whole field, which does not change its energy.
+"""Rotate a field by one angle on each connected component, to align it with the surface. Its energy does not change.
 
-The rotation depends on the shape alone: mirror images, reversed faces, rigid motions and scales have the same
-field of lines. On each connected component, the first criterion that prefers a rotation decides:
+The angle depends only on the shape: after a reflection, a rigid motion, a scaling or a reversal of all faces, the lines
+of the field are the same. On each connected component, the first of these criteria that prefers an angle decides:
 
 1. the principal directions of curvature (even degrees),
 2. creases and borders,
 3. the directions away from the center of the component,
-4. the principal directions, for twice an odd degree,
+4. the principal directions, for the members and their opposites (odd degrees),
 5. the edges of the mesh, which depend on how it is divided into faces,
-6. the edges for multiples of the degree. On solids such as a cube, the other criteria prefer nothing.
+6. the edges, for a RoSy of k N directions that contains the N members. Only this criterion decides on solids such as
+   a cube.
 
-Criteria 4 and 6 leave several rotations, and the one nearest to criterion 3 is taken. If criterion 3 prefers
-none of them, they are images of each other under the symmetries of the surface, and rounding errors decide.
+Criteria 4 and 6 allow k angles (k = 2 in criterion 4), and the one nearest to criterion 3 is taken. If criterion 3
+prefers none of them, they are images of each other under the symmetries of the surface, and rounding errors decide.
 """
 
 from collections.abc import Iterator
@@ -29,15 +30,15 @@ from .surface import Surface
 #: sum is 0 on many shapes. With 0.01, criterion 3 misses degree 3 on a head with one mirror plane.
 LEAST_SHARE = 0.003
 
-#: The sum of the moduli has to be at least this fraction of the area: less is rounding, or a mesh that is nearly flat
-#: or round.
+#: The sum of the moduli has to be at least this fraction of the area. It is smaller if there are only rounding errors,
+#: or if the mesh is nearly flat or round.
 LEAST_STRENGTH = 1e-3
 
-#: Curvature below which a surface counts as flat, relative to that of a sphere of the same area.
+#: Curvature below which a surface counts as flat, relative to the curvature of a sphere of the same area.
 FLAT_CURVATURE = 0.02
 
-#: Largest multiple of the degree for criterion 6. It has the order of the symmetries of a cube, or of a tetrahedron, as a
-#: factor, for all degrees.
+#: Largest multiple k of the degree for criterion 6. It is a multiple of 3 and of 4. So for each degree N, there is a k
+#: for which the directions along the edges do not cancel on the squares of a cube, and one for triangles.
 MAX_MULTIPLE = 12
 
 #: Smallest angle between the faces of a crease, in radians: the angle of sharp edges of *Features*.
@@ -61,7 +62,7 @@ def freely_rotated(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
     rotation = np.zeros(len(area), dtype=np.complex128)
 
     def sums(wanted: np.ndarray, present: np.ndarray) -> np.ndarray:
-        """Return (components,) sums of rotations to a criterion, 0 where it decides nothing."""
+        """Return (components,) complex sums whose phases rotate the field to a criterion; 0 if it does not decide."""
         total = complex_bincount(component, wanted * present.conj(), len(area))
         largest = np.bincount(component, np.abs(wanted), len(area))
         decides = np.abs(total) > LEAST_SHARE * np.maximum(largest, LEAST_STRENGTH * area)
@@ -85,7 +86,7 @@ def freely_rotated(surface: Surface, z: np.ndarray, degree: int) -> np.ndarray:
 def _criteria(
     surface: Surface, degree: int, component: np.ndarray, area: np.ndarray
 ) -> Iterator[np.ndarray]:
-    """Yield the (F,) representations of criteria 1 to 3, whose moduli are weights with the unit of an area.
+    """Yield (F,) representations of the directions that criteria 1 to 3 prefer. Moduli are weights, in units of area.
 
     `component` holds the (F,) connected component of each face, and `area` the area of each component.
     """
@@ -108,7 +109,7 @@ def _criteria(
 def _criteria_of_multiples(
     surface: Surface, degree: int, area: np.ndarray
 ) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield criteria 4 to 6, as pairs of a multiple k and (F,) representations of the degree k N.
+    """Yield, for criteria 4 to 6, k and the directions that they prefer, as (F,) representations of the degree k N.
 
     N is `degree`. `area` holds, for each face, the area of its connected component: (F,).
     """
@@ -119,11 +120,11 @@ def _criteria_of_multiples(
 
 
 def _curvature(surface: Surface, degree: int, area: np.ndarray) -> np.ndarray:
-    """Return (F,) representations of principal directions, times the areas of faces and confidences.
+    """Return (F,) representations of principal directions, whose moduli are face area times confidence.
 
-    For degrees that are no multiple of 4, only the direction of the curvature with the larger modulus counts.
-    It does not change if all faces are reversed, as the signs of curvatures do. `area` holds, for each face,
-    the area of its connected component: (F,).
+    For degrees that are no multiple of 4, only the direction of the principal curvature with the larger modulus counts.
+    Unlike the signs of curvatures, it does not change if all faces are reversed. `area` holds, for each face, the area
+    of its connected component: (F,).
     """
     smooth = with_smooth_normals(surface)
     mean, deviator = face_curvature(smooth, *smooth.face_frames)
@@ -136,10 +137,11 @@ def _curvature(surface: Surface, degree: int, area: np.ndarray) -> np.ndarray:
 
 
 def _along_edges(surface: Surface, degree: int, weight: np.ndarray | float = 1.0) -> np.ndarray:
-    """Return (F,) sums of representations of directions along edges, times squared lengths and weights.
+    """Return (F,) complex sums over the edges of each face: their representations, times squared length and weight.
 
-    Odd degrees need a direction with a sign that reversed faces do not change: away from the face, across the
-    edge. `weight` has a value for each corner, for the edge that starts there.
+    For odd degrees, a direction differs from its opposite, and edges change their direction if faces are reversed. So
+    the direction across the edge, away from the face, is used instead. `weight` has a value for each corner, for the
+    edge that starts there.
     """
     x, y = surface.face_frames
     face, points = surface.corner_face, surface.vertices[surface.corner_vertex]

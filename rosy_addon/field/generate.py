@@ -60,7 +60,7 @@ BYTES_PER_TRIANGLE = dict(
 
 
 def _only_for(*kinds: str) -> Callable[[Any], bool]:
-    """Return a predicate for `Setting.applies`: true if the settings have one of these kinds of fields."""
+    """Return a function for `Setting.applies`: whether the kind of field in the settings is one of `kinds`."""
     return lambda settings: settings.kind in kinds
 
 

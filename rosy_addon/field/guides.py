@@ -25,8 +25,8 @@ MAX_STROKE_DISTANCE = 0.05
 #: edge length is less: on a mesh with a few large faces and many tiny ones.
 MIN_STROKE_SPACING = 2.0**-14
 
-#: Rounding changes the angles between the axes of a UV map by less, in radians. Where two directions are
-#: equally near to both axes, all faces take the clockwise one.
+#: Upper bound of the rounding errors of the angles between the axes of a UV map, in radians. Where two directions
+#: are equally near to both axes, all faces take the clockwise one.
 TIE_ANGLE = 1e-6
 
 #: Largest number of samples of all strokes.
@@ -134,7 +134,7 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
 def guides_from_axes(
     surface: Surface, position: np.ndarray, axis: np.ndarray, radius: np.ndarray, degree: int
 ) -> np.ndarray:
-    """Make guides on the faces around points. Each point has an axis, which is projected to its faces.
+    """Make guides on the faces near points. Each point has an axis, and the guides are its projections to the faces.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def guides_from_axes(
 
 
 def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
-    """Make guides along the axes of a UV map: along u, or along both axes for some degrees.
+    """Make guides along the axes of a UV map: along u and v if the degree is a multiple of 4, otherwise along u.
 
     Parameters
     ----------
@@ -172,8 +172,9 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
         Texture coordinates of each corner.
     degree : int
         N of the field. If it is a multiple of 4, members follow the u axis and the v axis. Where the angle
-        between these axes is not a multiple of 360/N degrees, two members deviate equally from them, by half
-        of the rest: at most 90/N degrees. For other degrees, the guide is the direction of increasing u.
+        between these axes is not a multiple of 360/N degrees, no two members can follow both exactly. The member
+        nearest to each axis then deviates from it by the same angle, at most 90/N degrees. For other degrees, the
+        guide is the direction of increasing u.
 
     Returns
     -------

@@ -23,7 +23,7 @@ SHADING_NAMES = ("normals", "normal", "texture coordinates", "tcoords", "uv")
 def coinciding_borders(polygons: Polygons, vertex_data: Mapping[str, Any] | None) -> np.ndarray:
     """Find vertices on borders that are at the same position and have the same data.
 
-    Vertices are left out if an edge would get more than two faces by joining them, as where bodies touch.
+    Vertices are not joined if an edge would then have more than two faces, for example where two bodies touch.
 
     Parameters
     ----------
@@ -34,7 +34,8 @@ def coinciding_borders(polygons: Polygons, vertex_data: Mapping[str, Any] | None
     Returns
     -------
     (V,) int64 ndarray
-        For each vertex, the vertex of the smallest index that it coincides with: itself for most.
+        For each vertex, the vertex to join it to: of all that coincide with it, the one with the smallest index. For
+        most vertices, this is the vertex itself.
     """
     target = np.arange(len(polygons.vertices))
     edges = build_edges(polygons.corner_vertex, polygons.face_start)
@@ -81,7 +82,7 @@ def _have_same_data(data: Mapping[str, Any], count: int, pairs: np.ndarray) -> n
 def without_repeats(
     target: np.ndarray, polygons: Polygons
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the polygons with joined vertices, without corners at the same vertex as the next corner.
+    """Return the polygons after joining vertices. Of successive corners at the same vertex, only the last is kept.
 
     `target` holds, for each of V vertices, the vertex that replaces it (the result of `coinciding_borders`).
 

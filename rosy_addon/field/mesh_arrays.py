@@ -86,7 +86,7 @@ def mesh_arrays(
     name : str
         Name of the mesh in messages.
     uv : (V, 2) or (C, 2) array_like, optional
-        Texture coordinates of vertices or corners; by default those of the file or object.
+        Texture coordinates of vertices or corners; by default read from the file or object.
     step : int, optional
         Time step to read from the file of a simulation, from 1; by default the last one.
     join : bool, optional

@@ -34,7 +34,7 @@ SHARP_ANGLE = np.radians(60)
 
 
 def must_end_in(suffixes: Sequence[str]) -> str:
-    """Return the end of a message about a file name with another suffix: "its name must end in .a, .b or .c"."""
+    """Return the part of an error message that lists the allowed suffixes: "its name must end in .a, .b or .c"."""
     return f"its name must end in {', '.join(suffixes[:-1])} or {suffixes[-1]}"
 
 

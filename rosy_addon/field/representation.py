@@ -13,9 +13,9 @@ from .frames import dot, quotient
 from .rosy_field import RosyField
 from .surface import Surface
 
-#: A field turns by half of the angle 2 pi / N between members at an edge, up to this fraction of it, if two members
-#: of the second face are as near: a *tie*. The rounding errors of fields in single precision, or with six digits, are
-#: up to 2e-6 of it, for degree 12.
+#: An edge is a *tie* if two members of the second face are equally near to a member of the first face: the field turns
+#: by half of the angle 2 pi / N between members. This is the tolerance, as a fraction of 2 pi / N. The rounding errors
+#: of fields in single precision, or with six digits, are up to 2e-6 of 2 pi / N, for degree 12.
 TIE_TURNS = 1e-5
 
 
@@ -138,8 +138,8 @@ def matching_angles(
     -------
     (I,) float64 ndarray
         For each row: counter-clockwise angle in radians from a member of the first face
-        to the nearest member of the second face, from -pi / N to pi / N. At ties (see `TIE_TURNS`) it is
-        pi / N from the face with the smaller index, whatever the rounding errors.
+        to the nearest member of the second face, from -pi / N to pi / N. At ties (see `TIE_TURNS`), where
+        rounding errors would choose the sign, the angle from the face with the smaller index is pi / N.
     """
 
     def angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -154,8 +154,8 @@ def matching_angles(
 
 
 def is_tie(angle: np.ndarray) -> np.ndarray:
-    """Return whether angles between representations, from -pi to pi, are half a turn, up to rounding errors.
+    """Return whether angles between two representations, from -pi to pi, are pi or -pi, up to rounding errors.
 
-    The tolerance is `TIE_TURNS`, in turns.
+    The tolerance is `TIE_TURNS`, as a fraction of 2 pi.
     """
     return np.abs(angle) > np.pi * (1 - 2 * TIE_TURNS)

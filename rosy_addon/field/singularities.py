@@ -74,7 +74,7 @@ def _fan_counts(surface: Surface, vertex: np.ndarray) -> np.ndarray:
 def count_ties(surface: Surface, field: RosyField) -> int:
     """Return the number of edges at which the field turns by half the angle between its members.
 
-    There, two members of the second face match as well as each other. Which one is taken decides where
+    There, two members of the second face match equally well, and the choice between them decides where
     singularities are; see `representation.matching_angles`.
     """
     z = face_representation(surface, field)

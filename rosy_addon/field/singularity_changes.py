@@ -1,4 +1,4 @@
-"""Change singularities of a field: move them by hand, cancel near ones, and read near ones as one."""
+"""Change singularities of a field: move them by hand, cancel nearby ones, and merge clusters of nearby ones."""
 
 import numpy as np
 
@@ -98,7 +98,8 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
     Pairs with opposite indices are removed first, and then the clusters of all others whose sum is 0, such as
     +2/4 and two of -1/4. Directions change most near removed singularities, and less with the distance from
     them. All other singularities stay. A group is kept if the field without it would turn by pi / N or more
-    between two faces: after each attempt, the groups nearest to such faces are kept, twice as many as before.
+    between two faces. To find these groups, all are removed at once. If this fails, the groups nearest to such faces
+    are kept, and the others are tried again. Each new attempt keeps about twice as many more.
 
     Parameters
     ----------
@@ -170,7 +171,7 @@ def cluster_numbers(surface: Surface, vertex: np.ndarray, max_distance: float) -
 def cluster_singularities(
     surface: Surface, vertex: np.ndarray, index: np.ndarray, max_distance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Read nearby singularities as one, with the sum of their indices. Clusters whose sum is 0 are left out.
+    """Replace each cluster of nearby singularities by one, with the sum of their indices. Leave out sums of 0.
 
     Noise divides the singularity at a pole into several, such as five of +1/4 around one of -1/4.
 
@@ -199,10 +200,10 @@ def cluster_singularities(
 
 
 def _are_near(surface: Surface, places: np.ndarray, vertices: np.ndarray, least: int) -> np.ndarray:
-    """Return (n,) bool: which of the n vertices `places` are nearest to the given other vertices.
+    """Return (n,) bool: which of the n vertices `places` are nearest to any of `vertices`.
 
-    The distance of a vertex is the number of rings of faces from the given vertices to it. All up to some
-    distance are marked: `least` or more, if there are as many.
+    Distances are counted in rings of faces around `vertices`. The result is true up to the smallest distance within
+    which there are at least `least` of the places.
     """
     is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face

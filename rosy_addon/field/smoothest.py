@@ -1,15 +1,19 @@
-"""Compute the smoothest field of degree N: the field of unit vectors with the least Dirichlet energy that is found.
+"""Compute the smoothest field of degree N: of several local minima of the Dirichlet energy, the least one.
 
-The energy is a sum over the edges between faces (`unit_descent.FaceEnergy`). Its eigenvector with the smallest eigenvalue
-minimizes it among all fields of the same L2 norm (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013). It is small in some
-regions, and there its directions cost nothing. So some eigenvectors with small eigenvalues are diffused over shorter and
-shorter distances, after each of which the field gets length 1 again (Merriman, Bence and Osher 1992; for crosses, Viertel
-and Osting 2019). This moves singularities and cancels pairs. Then the angles descend to a local minimum. All this is done
-on a coarse multigrid level. On each finer level, the fields with the least energies are diffused over shorter distances and
-descend again: fewer from level to level.
+The energy is a sum over the edges between faces (`unit_descent.FaceEnergy`). The eigenvector with its smallest
+eigenvalue minimizes it among all fields of the same L2 norm (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013).
+But in regions where the eigenvector is short, its directions hardly change the energy. For unit vectors, the energy
+has many local minima, so the search has several starts:
 
-Eigenvectors of a torus have zeros, and descend to fields with singularities. So a closed component of this kind also has
-another start: the field without singularities that turns least.
+1. On a coarse multigrid level, compute some eigenvectors with small eigenvalues.
+2. Diffuse each of them over shorter and shorter distances, and normalize the vectors after each step (Merriman, Bence
+   and Osher 1992; for crosses, Viertel and Osting 2019). This moves singularities and cancels pairs.
+3. Rotate the vectors to a local minimum of the energy (`unit_descent.descend`).
+4. On each finer level, repeat steps 2 and 3 over shorter distances with the fields of least energy. The finer the
+   level, the fewer fields are kept.
+
+Eigenvectors of a torus have zeros, and lead to fields with singularities. So on closed components that are tori, the
+field without singularities that turns least is another start.
 """
 
 from __future__ import annotations
@@ -48,19 +52,20 @@ COARSE_ITERATIONS = 12
 #: small meshes is 1.3 times as long.
 START_COUNT, START_UNKNOWNS = 8, 500
 
-#: Largest sum of the unknowns of the fields that are kept on a finer level, unless it is only one. The least energy of a
-#: coarse level is often not the least one of the finest: with one field, energies are 1 % higher on average, and a third on
-#: one mesh. With 20,000, they are equal.
+#: Largest total number of unknowns of the fields that are kept for a finer level; at least one field is kept. The field
+#: of least energy on a coarse level is often not the best one on the finest level: if only one is kept, energies are
+#: 1 % higher on average, and a third higher on one mesh. With 20,000 unknowns, energies are equal.
 CANDIDATE_UNKNOWNS = 12_000
 
-#: Of fields whose energies differ by less than this part, the one from the earlier eigenvector comes first.
+#: Energies above the least one by at most this fraction count as equal; the field of the earlier eigenvector is then
+#: preferred.
 EQUAL_ENERGY = 1e-3
 
-#: On a torus, the field without singularities is taken if its energy is less by this part.
+#: On a torus, the field without singularities is taken if its energy is lower by more than this fraction.
 LESS_ENERGY = 1e-3
 
-#: Largest part of the weights that the gradient is at a saddle: a rounding error. Standard deviation of the random angles,
-#: in radians, that are added there.
+#: Gradient of the energy at a face, relative to the sum of the weights there, below which it is a rounding error.
+#: Standard deviation of the random angles, in radians, that are added at a saddle point.
 SADDLE_GRADIENT, SADDLE_NUDGE = 1e-6, 0.1
 
 #: Diffusion times of the starts, relative to the area of the connected component, and on each finer level, relative to the
@@ -77,7 +82,7 @@ LABEL = "diffusing the field"
 
 
 def smoothest_field(surface: Surface, degree: int) -> RosyField:
-    """Compute the field of unit vectors with the least Dirichlet energy that is found.
+    """Compute the field of unit vectors with the least Dirichlet energy, of several local minima.
 
     Parameters
     ----------
@@ -121,9 +126,9 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
 def _with_smooth_tori(
     surface: Surface, degree: int, energy: FaceEnergy, z: np.ndarray
 ) -> np.ndarray:
-    """Return (F,) representations of modulus 1: without singularities on tori, if that has less energy.
+    """Return (F,) representations z, replaced on tori by a field without singularities if it has less energy.
 
-    Tori are the closed components of Euler characteristic 0. On all others, the result is `z`.
+    Tori are the closed components of Euler characteristic 0.
     """
     component = energy.component
     corner_component, count = component[surface.corner_face], int(component.max()) + 1
@@ -197,11 +202,11 @@ class _Eigenproblem(NamedTuple):
     components: list[np.ndarray]
 
     def below(self, index: int) -> _Eigenproblem:
-        """Return the problem whose finest level has the given index here."""
+        """Return the same problem without the levels that are finer than level `index`."""
         return _Eigenproblem(*(each[index:] for each in self))
 
     def energy(self) -> FaceEnergy:
-        """Return the energy of representations of modulus 1 on the finest level, but for a constant."""
+        """Return the quadratic form of the matrix of the finest level, up to a constant, for values of modulus 1."""
         matrix = self.levels[0].matrix
         entry = np.flatnonzero((matrix.indices < matrix.row_indices) & (matrix.data != 0))
         value = matrix.data[entry]
@@ -210,9 +215,10 @@ class _Eigenproblem(NamedTuple):
         return FaceEnergy(*ends, weight, -value / weight, self.masses[0])
 
     def least_eigenvectors(self, count: int) -> np.ndarray:
-        """Return (count, n) eigenvectors with the smallest eigenvalues on each connected component of the finest level.
+        """Return (count, n) vectors: row k is the eigenvector k, by ascending eigenvalue, of each connected component.
 
-        A component with fewer unknowns has its first eigenvector several times. Matrices of components are dense.
+        They are computed with dense matrices, on the finest level. If a component has fewer unknowns than `count`,
+        its first eigenvector is repeated in the other rows.
         """
         mass, component = self.masses[0], self.components[0]
         vectors = np.empty((count, len(mass)), dtype=np.complex128)
@@ -229,7 +235,7 @@ class _Eigenproblem(NamedTuple):
         return vectors
 
     def diffused(self, z: np.ndarray, times: Sequence[float]) -> np.ndarray:
-        """Return (n,) representations on the finest level, diffused and normalized for each of the times.
+        """Diffuse (n,) representations on the finest level by each of the times in turn, and normalize after each.
 
         Times are relative to the area of the connected component.
         """
@@ -247,9 +253,10 @@ class _Eigenproblem(NamedTuple):
     def least_fields(
         self, fields: list[np.ndarray], times: Sequence[float], count: int
     ) -> list[np.ndarray]:
-        """Diffuse (n,) representations on the finest level, let their angles descend, and keep those with the least energy.
+        """Diffuse some fields, (n,) representations, and minimize their energy. Return those with the least energy.
 
-        At most `count` are kept, and one at least, each connected component by itself. The least energy comes first.
+        At most `count` fields are returned, but at least one. Connected components are sorted independently: the first
+        result combines the best fields of all components, the second one the second best, and so on.
         """
         energy, component, random = self.energy(), self.components[0], np.random.default_rng(0)
         found = []
@@ -267,7 +274,7 @@ class _Eigenproblem(NamedTuple):
 
 
 def _eigenproblem(levels: list[Level], mass: np.ndarray, component: np.ndarray) -> _Eigenproblem:
-    """Return the problem, given the mass and the connected component of each unknown of the finest level."""
+    """Return the eigenproblem on all levels, given the mass and the component of each unknown of the finest level."""
     masses, components = [mass], [component]
     for level in levels[:-1]:
         p = level.prolongation
@@ -280,12 +287,11 @@ def _eigenproblem(levels: list[Level], mass: np.ndarray, component: np.ndarray) 
 
 
 def _diffused_eigenvector(problem: _Eigenproblem) -> np.ndarray:
-    """Return (n,) representations of modulus 1 with little energy: the best of some diffused eigenvectors.
+    """Return (n,) representations of modulus 1 with a low energy, found from several eigenvectors.
 
-    The eigenvectors are computed on the finest level with at most `START_UNKNOWNS` unknowns and diffused, and their angles
-    descend to a local minimum. On each connected component, those with the least energy are interpolated, diffused and
-    descend again on the next finer level, and so on. The number that is kept halves as the number of unknowns doubles, so
-    all levels take about the same time.
+    This is the search that the module describes. It starts on the finest level with at most `START_UNKNOWNS` unknowns.
+    When the number of unknowns doubles from level to level, half as many fields are kept, so all levels take about the
+    same time.
     """
     sizes = [len(mass) for mass in problem.masses]
     first = next(
@@ -304,9 +310,10 @@ def _diffused_eigenvector(problem: _Eigenproblem) -> np.ndarray:
 
 
 def _is_at_saddle(energy: FaceEnergy, z: np.ndarray) -> bool:
-    """Return whether the energy has no gradient at (n,) representations, and is largest for the turn at an edge.
+    """Return whether (n,) representations are a saddle point: the gradient is 0, and the phase across an edge is pi.
 
-    On some solids, eigenvectors turn by exactly half a turn across edges, and descend nowhere.
+    On some solids, the phases of eigenvectors differ by exactly pi across edges. The energy of such an edge is at its
+    maximum, but a descent along the gradient would not leave it.
     """
     products = energy.products(z)
     has_gradient = np.abs(energy.sums(products.imag)) > SADDLE_GRADIENT * energy.diagonal
@@ -314,7 +321,7 @@ def _is_at_saddle(energy: FaceEnergy, z: np.ndarray) -> bool:
 
 
 def _eigenvector(problem: _Eigenproblem, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the eigenvector of `eigenproblem` and its eigenvalues, as there, found from level to level."""
+    """Solve an `eigenproblem` on each level, starting from the interpolated solution of the next coarser one."""
     levels, masses, components = problem
     random = np.random.default_rng(0)
     count = len(masses[-1])

@@ -26,16 +26,17 @@ DIRECT_SOLVE_SIZE = 100
 #: not connect two unknowns in an aggregate.
 STRENGTH_THRESHOLD = 0.08
 
-#: Matrix elements that differ by this part of the mean diagonal element have other hashes. Rounding errors change few.
+#: Before hashing, matrix elements are rounded to multiples of this fraction of the mean diagonal element, so that
+#: rounding errors change few hashes.
 HASH_PRECISION = 1e-6
 
-#: Number of links from an unknown to those elements on which its hash depends.
+#: Number of steps from an unknown, along matrix elements, within which the elements enter its hash.
 HASH_ROUNDS = 4
 
 #: Largest number of images of an unknown under the symmetries of a mesh: the order of the group of the cube.
 MAX_IMAGES = 48
 
-#: Difference of two connections, relative to the stronger one, that is a rounding error.
+#: Connections whose strengths differ by at most this fraction of the stronger one count as equally strong.
 EQUAL_STRENGTH = 1e-9
 
 
@@ -228,12 +229,12 @@ def _smoothed_prolongation(
 
 
 def _orders(matrix: CSRMatrix) -> np.ndarray:
-    """Return two orders of the unknowns, as (2, n) ranks: they do not depend on the numbering of the unknowns.
+    """Return two orders of the unknowns, as (2, n) ranks, that depend on the matrix and not on the numbering.
 
-    An unknown is ordered by a hash of the matrix elements in its neighborhood (Weisfeiler and Leman 1968). Unknowns
-    with equal hashes are images of each other under symmetries of the mesh. If there are at most `MAX_IMAGES`,
-    the second order reverses them, so that a choice in both orders is no choice between images. More of them are
-    in random order.
+    Unknowns are sorted by a hash of the matrix elements in their neighborhood (Weisfeiler and Leman 1968). Unknowns
+    with equal hashes are images of each other under symmetries of the mesh. They are in random order in the first
+    result, and in the reverse order in the second one, so no image comes last in both. If there are more than
+    `MAX_IMAGES` of them, they have the same random order in both results.
     """
     count = len(matrix)
     unit = max(float(matrix.diagonal.mean()), 1e-300) * HASH_PRECISION
@@ -254,8 +255,9 @@ def _orders(matrix: CSRMatrix) -> np.ndarray:
 def _roots(links: CSRMatrix, orders: np.ndarray) -> np.ndarray:
     """Return the roots of new aggregates, as (n,) bool: unknowns that are at least three links apart.
 
-    A free unknown that comes last, in both orders, among the free ones at most two links away is a root. If the orders
-    differ, none of its images is one.
+    Unknowns are *free* until they or a root within two links are chosen. In each round, a free unknown becomes a root
+    if it comes last, in both orders, of all free unknowns within two links. An unknown that comes last in only one of
+    the orders competes with its images under a symmetry. It is not free any more, so none of them is preferred.
 
     Parameters
     ----------
@@ -270,7 +272,7 @@ def _roots(links: CSRMatrix, orders: np.ndarray) -> np.ndarray:
     unknowns = np.arange(count)
 
     def max_over_links(values: np.ndarray) -> np.ndarray:
-        """Return the maximum of (n,) values over the links of each unknown, -1 where no free one is near."""
+        """Return (n,) maxima of values over each unknown and its links; -1 if none of these is free."""
         result = np.full(count, -1)
         result[unknowns] = np.maximum.reduceat(
             np.where(near.data, values.take(near.indices), -1), near.indptr[:-1]
@@ -319,8 +321,8 @@ def _aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
     root_order = np.where(root, orders, -1)
     for _ in range(2):
         report(1.0, "building multigrid levels")
-        # A free unknown joins the aggregate of the neighbor with the strongest connection. If equal ones lead to
-        # roots of different orders, the larger one wins in both orders, or none.
+        # An unknown joins the aggregate of the neighbor with the strongest connection. Of equally strong ones, the
+        # neighbor whose root comes last in both orders is taken; if there is none, the unknown does not join.
         weight = np.where(aggregate[column] >= 0, strength, 0)
         strongest = np.maximum.reduceat(weight, matrix.indptr[:-1])[row]
         is_strongest = (weight >= (1 - EQUAL_STRENGTH) * strongest) & (strongest > 0)

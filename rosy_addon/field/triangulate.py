@@ -21,8 +21,8 @@ FACES_PER_BLOCK = 1 << 14
 #: and on coarser grids of `sparse_multigrid` most pairs of its k neighbors become neighbors: k^2 / 4 of them.
 MAX_FAN = 256
 
-#: A diagonal is flipped if this makes its cotangents larger by more than this. If all corners of a face lie on a circle,
-#: the sums are 0, and differ by rounding errors.
+#: A diagonal is flipped if this makes the sum of the cotangents opposite it larger by more than this. If all corners of
+#: a face lie on a circle, these sums are 0 for all diagonals, up to rounding errors.
 EQUAL_COTANGENTS = 1e-6
 
 
@@ -75,7 +75,7 @@ def triangulate(
 def delaunay_triangles(
     points: np.ndarray, triangles: np.ndarray, triangle_face: np.ndarray
 ) -> np.ndarray:
-    """Return triangles with the Delaunay diagonals of the faces (Lawson 1977), whatever their first corners.
+    """Return Delaunay triangulations of the faces (Lawson 1977). They do not depend on the first corners of faces.
 
     Diagonals are flipped until the two angles opposite each of them add up to at most 180 degrees. Where all
     corners of a face lie on a circle, as in a rectangle, several divisions are as good. Then the cotangent
@@ -119,9 +119,9 @@ def _diagonals(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     pairs : (n, 2) intp ndarray
-        Rows of both triangles.
+        Indices of both triangles.
     quads : (n, 4) int32 ndarray
-        The four corners of both, counter-clockwise. The first and the third one are shared.
+        The four corners of both triangles, counter-clockwise. The first and the third corner are shared.
     """
     corner = triangles.ravel()
     halfedges = build_edges(corner, np.arange(0, len(corner) + 1, 3)).halfedges
@@ -151,10 +151,10 @@ def _gain_of_flips(corners: np.ndarray) -> np.ndarray:
 
 
 def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return `triangles` and `triangle_face` (see `triangulate`) if each face is split into a fan or a strip.
+    """Split faces into fans or strips (see `chain_corners`). Return `triangles` and `triangle_face` of `triangulate`.
 
-    `apex` holds, for each of F faces, the corner around which the fan is, counted from 0 within the face; strips
-    begin there.
+    `apex` holds, for each of F faces, the apex of the fan or the first corner of the strip, counted from 0 within the
+    face.
     """
     size = np.diff(face_start)
     count = size - 2
@@ -167,15 +167,15 @@ def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray
 
 
 def chain_corners(rank: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return the corners of the triangles of faces. Each triangle has a side in common with the next one.
+    """Return the corners of the triangles that divide faces. Each triangle shares a side with the next in its face.
 
-    They are a fan around the first corner of the face or, in a face with more than `MAX_FAN` corners, a strip between
-    its two sides.
+    The triangles of a face form a fan around its first corner or, if it has more than `MAX_FAN` corners, a strip that
+    zigzags between its two sides.
 
     Parameters
     ----------
     rank, size : (T,) int ndarray
-        Number of the triangle in its face, from 0, and the number of corners of the face.
+        Position of each triangle among the triangles of its face, from 0, and number of corners of the face.
 
     Returns
     -------

@@ -33,8 +33,8 @@ TOLERANCE = 1e-10
 #: the fraction of pi / N up to which the angle at an edge needs no reduction.
 MAX_ATTEMPTS, ANGLE_MARGIN = 24, 0.8
 
-#: Largest factor of a resistance after several attempts. With more, a sum of conductances in floating point loses the
-#: smallest ones.
+#: Largest factor of a resistance after several attempts. With a larger one, the smallest terms in a sum of conductances
+#: would be lost to rounding.
 MAX_RESISTANCE = 1e15
 
 #: An attempt changes the angles at all edges within this number of edges of an edge with too large an angle.
@@ -81,13 +81,13 @@ def turning_angles(
     Returns
     -------
     angle : (I,) float64 ndarray
-        Angles with the least weighted sum of squares, like `present`. Around each loop, these angles, the
-        present angles and the angles between the frames of neighboring faces add up to a multiple of 2 pi /
-        N. Where the field would turn by pi / N or more between two faces, the angles are reduced, if
-        possible.
+        The angles to add to `present`, in the same form. They have the least weighted sum of squares. Around
+        each loop, these angles, the present angles and the angles between the frames of neighboring faces add
+        up to a multiple of 2 pi / N. Where the field would turn by pi / N or more between two faces, the
+        angles are reduced, if possible.
     direction : (F,) float64 ndarray
-        Direction on each face of the field that turns by the present angles plus these angles, in radians in
-        the frame of the face.
+        Direction, on each face, of the field with the turning angles ``present + angle``: an angle in radians
+        in the frame of the face.
     """
     triangles = triangle_graph(graph)
     present_between = triangles.on_triangles(present)
@@ -113,7 +113,7 @@ def turning_angles(
             if changed is None:
                 drop = least_angles(triangles.graph, degree, required, loops, present_between)
                 changed = triangles.graph.conductance * drop
-        # The resistances apply to the angles between triangles, not to those from triangles to face centers.
+        # The resistances apply to the angles between triangles, not to the angles from triangles to face centers.
         for triangle in (triangles.graph.source, triangles.graph.target):
             to_center[triangle[changed != between]] = 0
         between, angle = changed, triangles.on_faces(changed, to_center)
@@ -160,11 +160,11 @@ def _least_angles_near(
 
 
 def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: float) -> np.ndarray:
-    """Return (I,) factors for the resistances of edges, which make angles smaller where they are too large.
+    """Return (I,) factors, at least 1, for the resistances of edges, to reduce turning angles that are too large.
 
-    The resistance of an edge is its weight in the sum of squares. `angle` and `present` hold the (I,) added
-    and present turning angles, in radians, as is `limit`. A factor is 1 unless the added angle brings the
-    modulus of the sum near to `limit` or above it.
+    The resistance of an edge is the weight of its squared angle in the energy. `angle` holds the (I,) angles that are
+    added to the (I,) turning angles `present` of a field. The factor is above 1 where the modulus of their sum is near
+    `limit` or above it. All angles are in radians.
     """
     room = np.maximum(limit - np.sign(angle) * present, MIN_ROOM * limit)
     return np.maximum(np.abs(angle) / (ANGLE_MARGIN * room), 1) ** 2
@@ -173,9 +173,9 @@ def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: floa
 def least_angles(
     graph: FaceGraph, degree: int, required: np.ndarray, loops: Loops, present: np.ndarray | float
 ) -> np.ndarray:
-    """Return (M,) float64, each turning angle divided by the conductance of its edge.
+    """Compute the turning angles of least energy. Return them divided by the conductances of their edges, (M,) float64.
 
-    The angles have the least sum of squares, each divided by the conductance. `graph` has M edges: it is the
+    The energy is the sum of the squared angles, each divided by the conductance. `graph` has M edges: it is the
     graph of triangles (`TriangleGraph.graph`) or, for a simpler solution, the graph of faces. `loops` is the
     result of `_loops` for this graph, or empty to ignore loops. `required` holds the (n,) sums of the angles
     around interior nodes, in radians. `present` holds (M,) turning angles of an existing field at the edges,
@@ -218,7 +218,8 @@ def potential_solver(
 
     It takes the (n,) sums of angles around the interior nodes, in radians, and returns the (n,) potential at
     the nodes. The solver stops when the residual norm is `tolerance` times the norm of the right-hand side.
-    `direct_size` is the number of unknowns up to which a dense inverse pays: more if there are many solutions.
+    A multigrid level with at most `direct_size` unknowns is solved with a dense inverse. A larger value pays if the
+    returned function is called often.
     """
     matrix = levels = None
     if graph.is_interior.any():

@@ -1,4 +1,4 @@
-"""Unfold faces that are folded over their neighbors, as some are in scans."""
+"""Unfold faces that are folded over their neighbors, which occur in scans, and orient all faces consistently."""
 
 import numpy as np
 
@@ -19,8 +19,7 @@ def folded_faces(surface: Surface) -> np.ndarray:
     """Return (F,) bool: whether each face is folded over its neighbors.
 
     The normal of such a face is more than 90 degrees from the normals of most of its neighbors, and from the
-    mean normal at each of its vertices. At the tip of a pointed part, such as a tetrahedron, the mean normal
-    at the vertices is less than 90 degrees from those of the faces.
+    mean normal at each of its vertices. The second condition excludes pointed parts, such as a tetrahedron.
     """
     edges, normal = surface.edges, surface.face_normal
     face_a, face_b = surface.corner_face[edges.halfedges].T
@@ -41,9 +40,9 @@ def folded_faces(surface: Surface) -> np.ndarray:
 def unfolded(surface: Surface) -> Surface:
     """Return the surface without folded faces, and oriented consistently.
 
-    A surface that needs no change is returned itself. In each part that can be oriented, the orientation of
-    most faces counts, and the others are reversed. The vertices of folded faces move to the mean of their
-    neighbors. Faces keep their numbers, but the corners of reversed faces do not.
+    If nothing has to change, the result is `surface` itself. In each orientable part, faces that are oriented against
+    the majority are reversed. The vertices of folded faces move to the mean of their neighbors. Faces keep their
+    numbers; the corners of reversed faces are numbered in the opposite order.
     """
     start, face = surface.face_start, surface.corner_face
     is_reversed = _reversed_faces(surface)
@@ -69,8 +68,7 @@ def unfolded(surface: Surface) -> Surface:
 def _reversed_faces(surface: Surface) -> np.ndarray:
     """Return (F,) bool: whether each face has the opposite orientation of most faces of its part.
 
-    A part is a set of faces that are connected by edges with two faces. No face of a one-sided part is
-    reversed.
+    A part is a set of faces that are connected by edges with two faces. Nonorientable parts are not changed.
     """
     edges, count = surface.edges, surface.face_count
     is_pair = edges.face_count == 2

@@ -1,7 +1,7 @@
-"""Reduce the energy of a field of unit vectors on the faces: the one that `analysis.dirichlet_energy` reports.
+"""Minimize the Dirichlet energy (`analysis.dirichlet_energy`) of a field of unit vectors on the faces.
 
-The angles of the faces descend to a minimum by nonlinear conjugate gradients. On meshes of few faces, singularities
-are moved as well.
+The vectors are rotated to a local minimum by nonlinear conjugate gradients. On meshes of few faces, singularities are
+moved across edges as well.
 """
 
 from dataclasses import dataclass
@@ -25,11 +25,11 @@ LAST_STEPS, LEAST_GAIN, MAX_STEPS = 5, 1e-5, 300
 #: Largest weight of an edge, relative to the median. Edges of slivers would make the matrix ill-conditioned.
 MAX_WEIGHT_RATIO = 1e4
 
-#: Largest median of the weights that counts, which are near 1 on good meshes. If most faces are slivers, the energies of
-#: others would be rounding errors.
+#: Upper limit for this median. Weights are near 1 on good meshes. If most faces are slivers, their weights would be so
+#: large that the energies of all other edges would be rounding errors.
 MAX_MEDIAN = 1e4
 
-#: Smallest second derivative along the search direction, relative to that of a field that turns nowhere.
+#: Smallest second derivative along the search direction, relative to the second derivative for a parallel field.
 MIN_CURVATURE_RATIO = 0.1
 
 #: With at most this number of faces, singularities are moved across edges, if this reduces the energy. This many edges are
@@ -39,13 +39,14 @@ FEW_FACES, MOVES_TRIED = 400, 30
 #: Time for which the direction of a face is diffused, relative to the area. With 0.03, energies are equal on average.
 TRANSPORT_TIME = 0.01
 
-#: As `LEAST_GAIN`, to compare fields, and to end at the minimum itself.
+#: Values in place of `LEAST_GAIN`: for fields that are only compared, and to end exactly at the minimum.
 CHOICE_GAIN, EXACT_GAIN = 1e-4, 1e-14
 
-#: Difference of gains, relative to the largest, that is a rounding error.
+#: Gains whose difference is less than this fraction of the largest one count as equal.
 EQUAL_GAIN = 1e-3
 
-#: Smallest gain that makes another minimum the better one, relative to the energy plus 1: no rounding error.
+#: Another minimum is better if its energy is lower by more than this fraction of the energy plus 1. Less is a rounding
+#: error.
 MIN_GAIN = 1e-6
 
 LABEL = "smoothing the field of unit vectors"
@@ -74,7 +75,7 @@ class FaceEnergy:
     area: np.ndarray
 
     def products(self, z: np.ndarray) -> np.ndarray:
-        """Return (I,) complex128: w times the rotation from the transported z of the source to the target's."""
+        """Return (I,) complex128: ``w conj(r z_f) z_g``, whose phase is the turn of z across the edge."""
         products = z.take(self.source)
         products *= self.transport
         np.conjugate(products, out=products)
@@ -110,7 +111,10 @@ class FaceEnergy:
 
     @cached_property
     def edge_response(self) -> np.ndarray:
-        """(I, F) float64: phases of the faces when the phase at an edge turns by 1 more, per unit of its weight."""
+        """(I, F) float64: for each edge, the solution x of L x = (1 at its target, -1 at its source, 0 elsewhere).
+
+        L is the Laplacian matrix of the graph of the faces, with the weights of the edges.
+        """
         diagonal = self.diagonal * (1 + 1e-9)
         response = dense_inverse(from_edges(self.target, self.source, -self.weight, diagonal))
         return response[self.target] - response[self.source]
@@ -138,11 +142,12 @@ def face_energy(surface: Surface, degree: int, is_defined: np.ndarray) -> FaceEn
 
 
 def least_of_few(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
-    """Return the better of two local minima, on meshes of few faces: near the given field, or near one from a face.
+    """Return the better of two local minima of the energy, for meshes of few faces.
 
-    The second is the direction of one face of each connected component, transported to the others by diffusion: of all
-    faces, the one that gives the least energy is taken. On a frame with two holes of 206 quads, it reaches the least energy
-    of 90 random fields at degree 2. For the parameters, see `with_moves`.
+    `with_moves` searches them from two starts. One is the given field z. The other is a vector on one face of each
+    connected component, transported to all other faces by diffusion; the face is chosen for the least energy. On a
+    frame with two holes (206 quads, degree 2), the second start reaches the least energy of 90 random starts. For the
+    parameters, see `with_moves`.
     """
     shift = 1 / (TRANSPORT_TIME * float(energy.area.sum()))
     columns = unit_complex(dense_inverse(energy.matrix(shift)), otherwise=1)
@@ -158,11 +163,12 @@ def least_of_few(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
 
 
 def with_moves(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
-    """Descend to a local minimum, and move singularities across edges, one at a time, as long as this reduces the energy.
+    """Descend to a local minimum, and move singularities across edges, one by one, while this reduces the energy.
 
-    A singularity crosses an edge if the phase there turns by 2 pi more or less. If the other angles adapt, this changes
-    the energy, to second order, by ``4 pi w (pi (1 - w R) - |turn|)``, where R is the resistance between both faces in the
-    graph of the faces, with conductances w (Doyle and Snell 1984). The most promising edges are tried.
+    A singularity moves across an edge when 2 pi is added to or subtracted from the turn of z across the edge. After all
+    other phases have adapted, the energy has changed, to second order, by ``4 pi w (pi (1 - w R) - |turn|)``. Here R is
+    the effective resistance between the two faces, in the graph of the faces with the conductances w (Doyle and Snell
+    1984). The edges at which the energy would decrease most are tried.
 
     This is for meshes of few faces: a dense matrix of the faces is inverted.
 
@@ -182,7 +188,7 @@ def with_moves(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
         improved = False
         turn = np.angle(energy.products(z))
         gain = energy.weight * (np.abs(turn) - barrier)
-        # Equal gains of mirror images, of which rounding errors must not choose: the first edge is tried first.
+        # Rounded, the gains of mirror images are equal, and the first edge is tried first.
         rank = np.round(gain / (EQUAL_GAIN * max(float(np.abs(gain).max(initial=0)), 1e-300)))
         for edge in np.argsort(-rank, kind="stable")[:MOVES_TRIED].tolist():
             change = 2 * np.pi * np.sign(turn[edge]) * energy.weight[edge] * per_edge[edge]
@@ -197,8 +203,8 @@ def with_moves(energy: FaceEnergy, z: np.ndarray) -> np.ndarray:
 def descend(energy: FaceEnergy, z: np.ndarray, tolerance: float = LEAST_GAIN) -> np.ndarray:
     """Rotate each representation until the energy is near a local minimum (Polak and Ribière 1969).
 
-    The second derivative along a search direction is at most `bound`, that of a field that turns nowhere. A step of
-    this length reduces the energy surely; it is taken if the longer one does not.
+    Along a search direction, a Newton step is tried first. If it does not reduce the energy, a shorter step is taken,
+    which always does: it replaces the second derivative by its upper bound, the second derivative for a parallel field.
     """
     search, old_gradient, old_norm = np.zeros(len(z)), np.zeros(len(z)), 1.0
     products, total = energy.products(z), energy.weight.sum()

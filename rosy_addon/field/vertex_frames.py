@@ -1,4 +1,4 @@
-"""The tangent frames of geometry-central at vertices, in which its vectors have two numbers."""
+"""Convert vectors with two components to object space, as in geometry-central's tangent frames at vertices."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ FRAME_NOTE = "rows have two numbers; they are read as vectors at the vertices, i
 
 
 def in_space(surface: Surface, rows: np.ndarray, source: str) -> tuple[np.ndarray, str | None, str]:
-    """Return vectors in object space that are given by two numbers each.
+    """Convert vectors with two components each to object space.
 
     Parameters
     ----------
@@ -33,12 +33,12 @@ def in_space(surface: Surface, rows: np.ndarray, source: str) -> tuple[np.ndarra
     domain : {"vertex"} or None
         The mesh elements to which the vectors belong; None to infer it from the number of rows.
     note : str
-        Says for the user how the numbers were read.
+        Text for the user that says how the two numbers were interpreted.
 
     Raises
     ------
     RosyError
-        If the surface is not flat, and there is not a row for each vertex, or a vertex has no frame.
+        If the vertices differ in z, and the number of rows is not the number of vertices or a vertex has no frame.
     """
     if not np.ptp(surface.vertices[:, 2]):
         return np.pad(rows, ((0, 0), (0, 1))), None, FLAT_NOTE
@@ -50,11 +50,11 @@ def in_space(surface: Surface, rows: np.ndarray, source: str) -> tuple[np.ndarra
 def vertex_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Return the x and y axes of geometry-central's tangent plane at each vertex.
 
-    The angles between the edges around a vertex are scaled so that their sum is 2 pi, or pi on the border.
-    The angle 0 is at the first edge. Inside, it leads to the next corner of the face with the largest index
-    at the vertex. On the border, it is the border edge that has a face to its left. The x axis is the mean of
-    the projected edges, each rotated back by its angle (Sharp, Soliman and Crane, *The Vector Heat Method*,
-    2019; ``vertexTangentBasis``).
+    The angles between the edges around a vertex are scaled so that their sum is 2 pi, or pi on the border. They are
+    counted from the first edge. At an interior vertex, this is the edge to the next corner in the face with the
+    largest index. At a border vertex, it is the border edge that has a face to its left. The x axis is the mean of the
+    projected edges, each rotated back by its angle (Sharp, Soliman and Crane, *The Vector Heat Method*, 2019;
+    ``vertexTangentBasis``).
 
     Parameters
     ----------

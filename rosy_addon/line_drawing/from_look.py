@@ -1,4 +1,4 @@
-"""Strokes like the lines of a look: its spacing, widths, light, outline, ends, colors and marks."""
+"""Derive settings of strokes from a look: spacing, widths, light, outline, ends, colors and marks."""
 
 from dataclasses import replace
 from typing import Any
@@ -22,16 +22,16 @@ SETTINGS_OF_LOOK = (
 
 
 def strokes_of_look(look: Any, style: StrokeStyle, pen: Pen) -> tuple[StrokeStyle, Pen]:
-    """Return the style and the pen of strokes that look like the lines of a look.
+    """Return a style and a pen with which strokes resemble the lines that a look draws on pixels.
 
     Parameters
     ----------
     look : PixelLook
-        A look in pixels of the picture. Soft streaks set neither the spacing nor the pen.
+        The look, whose lengths are in pixels of the picture. If its ink is "soft", spacing and pen do not change.
     style : StrokeStyle
-        Its other settings stay: curvature, gaps, taper and hidden strokes.
+        The style to change. Settings that are not in `SETTINGS_OF_LOOK`, such as the taper, are kept.
     pen : Pen
-        Its page stays, and its colors if there are several: one for each family.
+        The pen to change. Its page is kept. If it has several colors, one for each family, they are kept, too.
 
     Returns
     -------

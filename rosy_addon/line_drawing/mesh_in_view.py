@@ -1,4 +1,4 @@
-"""Cut from a tangent mesh the part on which strokes are traced: it is in the frame and visible.
+"""Reduce a tangent mesh to the part on which strokes are traced: the part in the frame that is visible.
 
 Without this cut, there would be no limit to the number of strokes outside the frame: toward the plane through
 the eye, the size of a pixel in world space falls to zero, and the spacing of strokes falls with it.

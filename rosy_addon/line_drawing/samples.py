@@ -230,7 +230,7 @@ class StrokeSamples(ColumnTable):
     def probes(self, particles: SurfaceParticles) -> Iterator[np.ndarray]:
         """Context manager: add temporary samples at n particles, and yield their indices.
 
-        They can be compared with other samples, but are not found by comparisons of other samples. Do not add
+        They can be compared with the other samples, but comparisons of other samples do not find them. Do not add
         samples in the block.
         """
         count = self.count

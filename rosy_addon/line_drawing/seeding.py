@@ -65,10 +65,11 @@ MIN_TURN_RATIO = 1e-6
 def singularities(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the zeros of the interpolated field.
 
-    The field turns along each edge of a triangle. If it turns by nearly half a turn, the two triangles at the edge may
-    see it turn to different sides, because the field is not quite continuous there: a zero near the edge is then in both
-    triangles, or in none. The side of the smaller turn is taken in both triangles. So the sum of the indices is the
-    Euler characteristic (Poincare-Hopf theorem), unless triangles are too large for the curvature.
+    A triangle contains a zero if the phase of z does not return to its value on the way around it, but changes by a
+    multiple of 2 pi. Along an edge on which the phase changes by nearly pi, the two triangles may disagree on the sign
+    of the change, because z is not quite continuous across edges. A zero near the edge would then be counted in both
+    triangles or in none. So the sign of the smaller change is used in both. On a closed surface, the sum of the indices
+    is then the Euler characteristic (Poincare-Hopf theorem), unless triangles are too large for the curvature.
 
     Returns
     -------
@@ -165,7 +166,7 @@ def _is_isolated(points: np.ndarray, radius: np.ndarray) -> np.ndarray:
 
 
 def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfaceParticles:
-    """Return seeds at evenly distributed points of the mesh, about `CANDIDATE_DENSITY` in a square spacing.
+    """Return seeds at evenly distributed points of the mesh, `CANDIDATE_DENSITY` points per squared spacing.
 
     Each point has a seed for each of the M different directions in which a streamline runs through it.
 

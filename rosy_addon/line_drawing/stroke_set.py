@@ -52,7 +52,7 @@ class Strokes:
         Whether the last point is the same as the first.
     free_ends : (S, 2) bool ndarray or None
         Whether the first and the last point are free ends, at which the stroke may be extended: it is
-        occluded there, or its surface or the shade ends. None means that no end is free.
+        occluded there, or the surface or the shaded area ends. None means that no end is free.
     """
 
     points: np.ndarray

@@ -16,7 +16,7 @@ def read_dmat(path: Path) -> RawField:
     """Read a matrix of libigl with a row of 3, 3 N or 9 numbers for each face or vertex.
 
     The numbers are one member vector, all N directions or a symmetric tensor, as in `plain.read_text`. A
-    first column of numbers of rows, or of flags 0 and 1, is not read.
+    first column that holds row numbers, or flags 0 and 1, is ignored.
 
     Raises
     ------

@@ -95,7 +95,7 @@ def vertex_members(surface: Surface, field: RosyField) -> np.ndarray:
 def fieldgen_text(surface: Surface, field: RosyField) -> str:
     """Return the text of a fieldgen file with a mesh and a field.
 
-    The vectors are those of `vertex_members`.
+    `vertex_members` computes the vectors.
     """
     vertex, normal = surface.corner_vertex, vertex_normals(surface)
     member = vertex_members(surface, field)

@@ -13,7 +13,7 @@ from ..surface import Surface
 #: The beginning of the names of the arrays of directions, which are counted from 1.
 DIRECTION = "direction_"
 
-#: Names of VTK's types of numbers by those of numpy, and VTK's types of cells by their number of corners.
+#: VTK's names of number types, by numpy's codes, and VTK's codes of three cell types.
 _VTK_TYPES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
 _TRIANGLE, _POLYGON, _QUAD = 5, 7, 9
 

@@ -68,7 +68,7 @@ def _is_kind(rows: TextRows, kind: bytes) -> np.ndarray:
 
 
 def _position_indices(corners: TextRows) -> TextRows:
-    """Return rows with position indices only: v of corners v, v/vt, v//vn and v/vt/vn."""
+    """Return rows with only the position index v of each corner, which is written v, v/vt, v//vn or v/vt/vn."""
     rows: list[Sequence[bytes]] = []
     for start in range(0, len(corners), ROWS_PER_BLOCK):
         words = corners.words[start : start + ROWS_PER_BLOCK]

@@ -18,7 +18,7 @@ from ..blocks import as_float64
 from .polygons import Polygons, offsets_from_sizes
 from .text_rows import TextRows, abbreviate, read_rows
 
-#: numpy's codes of types by their names: those of C, and those of numpy, such as int8.
+#: numpy's codes of number types, by their names in C, such as char, and in numpy, such as int8.
 _CODES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
 _C_NAMES = ("char", "uchar", "short", "ushort", "int", "uint", "float", "double")
 _DTYPES = dict(zip(_C_NAMES, _CODES, strict=True)) | {np.dtype(k).name: k for k in _CODES}
@@ -90,7 +90,7 @@ def _strip_triangles(vertices: np.ndarray, starts: np.ndarray) -> tuple[np.ndarr
 
     The strips are rows of vertices: row i is ``vertices[starts[i] : starts[i + 1]]``. A strip ends at the end
     of its row and at -1. Three consecutive vertices are a triangle, and every other triangle is clockwise.
-    Triangles that have a vertex twice, which turn a strip, are left out.
+    Triangles with a repeated vertex, which programs insert to change the direction of a strip, are left out.
     """
     vertices = np.insert(vertices.astype(np.float64), starts[1:-1], -1)
     is_end = vertices == -1

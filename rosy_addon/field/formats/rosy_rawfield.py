@@ -62,9 +62,9 @@ def rows_text(surface: Surface, field: RosyField) -> str:
 
 
 def _read_header(rows: TextRows, *names: str) -> list[int]:
-    """Return the first one or two integers of a file; two are on one line or on two.
+    """Return the integers at the beginning of a file, one for each of `names`. Two may be on one line or on two.
 
-    `names` are their names in messages. One with the name "degree" must be a degree.
+    `names`, one or two, are used in messages. The integer with the name "degree" must be a valid degree.
     """
     words = [word for line in rows.words[:2] for word in line]
     values = []

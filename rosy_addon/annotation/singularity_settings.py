@@ -32,7 +32,7 @@ def shows_clusters(settings: Any) -> bool:
 
 
 def singularity_dots_choice(**place: Any) -> Any:
-    """Return a dataclass field for the setting `singularity_dots`; `place` holds its stage and its panel."""
+    """Return a dataclass field for the setting `singularity_dots`, given its `panel` and `stage` for `choice`."""
     return choice(
         "none",
         "Which singularities have dots: orange for positive index, blue for negative index. The "
@@ -58,7 +58,7 @@ def singularity_dots_choice(**place: Any) -> Any:
 
 
 def singularity_size_number(**place: Any) -> Any:
-    """Return a dataclass field for the setting `singularity_size`; `place` holds its stage and its panel."""
+    """Return a dataclass field for the setting `singularity_size`, given its `panel` and `stage` for `number`."""
     return number(
         9.0,
         1.0,

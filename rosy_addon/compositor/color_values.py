@@ -1,4 +1,4 @@
-"""Color values: numbers on the surfaces that a color map shows. Their range and positions in the map."""
+"""Range of color values (numbers on surfaces that a color map shows), and their positions in the map."""
 
 from collections.abc import Iterable
 

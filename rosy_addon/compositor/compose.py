@@ -136,8 +136,7 @@ def _draw_strips(
 ) -> list[np.ndarray]:
     """Draw all layers, strip by strip. Return the (H, W, 4) RGBA picture and the `_Canvas.spread` image.
 
-    The second image tells in its first channel how far the thresholds of ink in a pixel spread. It has no
-    columns if no thresholds are drawn.
+    The second image has the spread in its first channel. It has no columns if no thresholds are drawn.
     """
     pictures = []
     for number, strip in enumerate(strips):
@@ -184,7 +183,7 @@ class _Canvas:
     spread : (P, 1) float32 ndarray
         If thresholds of ink are drawn in place of colors: the alpha channel that
         `ink_thresholds.threshold_pixels` returns, which tells how far the thresholds in a pixel spread.
-        Otherwise it has no pixels.
+        Otherwise it has the shape (0, 1).
     """
 
     def __init__(
@@ -204,9 +203,9 @@ class _Canvas:
         self.spread = np.zeros((count if draws_thresholds else 0, 1), dtype=np.float32)
 
     def picture(self, strip: Strip) -> tuple[np.ndarray, np.ndarray]:
-        """Return two images of a strip: its colors, and how far the thresholds of ink in its pixels spread.
+        """Return two RGBA images of a strip: its colors, and the `spread` of thresholds as gray.
 
-        The second image has no channels if colors are drawn instead of thresholds.
+        The second image has no columns if colors are drawn instead of thresholds.
         """
         rgba = self._resolved(self.color, strip.drawn_rows)
         if not self.draws_thresholds:
@@ -393,9 +392,9 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Pixel
     """Return the (P, 3) or (P, 1) linear colors of pixels.
 
     Pixels are gray, or colored by the magnitude, the family of lines or the color values, as the look says.
-    Pixels without a color value are gray, and so are undefined ones without streaks. `tone`, (P, K), holds
-    the brightness of the streaks as display values, from `streak_tone`. `images` decide which family
-    dominates.
+    Pixels without a color value are gray. Where the field is undefined, pixels are a uniform gray, unless the
+    look draws streaks there. `tone`, (P, K), holds the brightness of the streaks as display values, from
+    `streak_tone`. `images` determine which family dominates.
     """
     hue, position = None, None
     if colors_magnitude(look):

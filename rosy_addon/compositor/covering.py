@@ -103,7 +103,7 @@ class Covering:
     line_count : int
         M = S / 2, the number of lines (pairs of opposite directions) through a cell.
     sheets_per_turn : int
-        Sheets that a full turn passes: S, or N.
+        Sheets that a full turn passes: S, or N if forward and backward directions are two coverings.
     width : int
         Number of cells in a row of the window. The cell above the cell c is c + width.
     cell_of_pixel : (P,) int32 ndarray
@@ -325,13 +325,12 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
 
 
 def _surface_steps(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Shorten steps to at most one pixel along x and y; also return factors for the noise gradient.
+    """Return steps shortened to at most one pixel along x and y, and these steps over their squared length.
 
-    `x` and `y` are the components of (n,) steps in the picture, in pixels. The result is two (x, y) pairs.
-    The first pair is the shortened steps. The second pair replaces the unit vector along the step when the
-    derivative of the noise to the left is computed from its gradient. `streamline_batch` multiplies this
-    derivative by `streamline_tracing.lateral_offset`, which is proportional to the length of the step. So the
-    second pair is the step divided by the square of its length.
+    `x` and `y` are the components of (n,) steps in the picture, in pixels. The result is two (x, y) pairs:
+    the shortened steps s, and s / |s|^2, where |s| counts as at least `SHORT_STEP`. The second pair is for the
+    derivative of the noise to the left: it replaces the unit vector s / |s|, because `streamline_batch`
+    multiplies the derivative by `streamline_tracing.lateral_offset`, which has a factor |s|.
     """
     scale = 1 / np.maximum(np.maximum(np.abs(x), np.abs(y)), np.float32(1))
     x, y = x * scale, y * scale

@@ -39,7 +39,7 @@ class MovingKernel:
         For each channel: the steps that its streaks have drifted from their middle position, and the weight
         of the channel in the sum.
     reach : int
-        R, steps from the pixel to the last sample.
+        R, the largest number of steps from a pixel to a sample of its kernels.
     energies : (3, L, 2 R + 2) float64 ndarray
         Prefix sums over the samples from -R - 1 to R of three products: the squares of the weights of the
         kernel that drifts forward, the squares for the kernel that drifts backward, and the products of both

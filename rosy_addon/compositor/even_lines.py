@@ -72,8 +72,8 @@ class EvenLines:
     period : (M, P) float32 ndarray
         Distance between lines on screen, in pixels of the frame. 0 where there are no lines.
     growth : (P,) float32 ndarray or None
-        New lines appear halfway between the existing lines. Their width as a fraction of the width of the
-        existing lines, from 0 (no new lines) to 1 (equally wide). None if no new lines appear.
+        Width of the new lines halfway between the existing lines, as a fraction of the width of the existing
+        lines: from 0 (no new lines) to 1 (equally wide). None if there are no new lines at any pixel.
     coarse_streaks : (M, P) float32 ndarray or None
         `streaks` of the lines that replace crowded ones. None if no lines are crowded.
     """
@@ -341,15 +341,15 @@ def line_phases(
     members : list of (n,) complex64 ndarray
         Unit vectors in the view plane, from `all_members`.
     first_direction : (n,) int ndarray
-        Number, in the directions of `lines` (0 to N - 1), of the direction that ``members[0]`` is.
+        Index, modulo N, of ``members[0]`` among the N directions of `lines`.
     step : (n,) int ndarray or int
-        What is added to the number of the direction from one member to the next: 1, or -1 where the surface
-        is seen from behind.
+        Difference of this index from one member to the next: 1, or -1 where the surface is seen from behind.
 
     Returns
     -------
     phases : (M, n) float32 ndarray
-        Position across the lines of each of the M lines of directions, in distances between lines.
+        Phase of the lines along each of the M line directions: the position across these lines, in distances
+        between lines.
     foreshortening : (M, n) float32 ndarray
         Distance between lines on screen, relative to the distance on a surface that faces the eye.
     """
@@ -406,7 +406,7 @@ class _InstanceLines:
             `EvenLines.streaks`, and the distance between lines on screen in pixels of the frame. `period`
             does not depend on `ratio`: it is the distance at the ratio 1.
         growth : (n,) float32 ndarray
-            Width of the new lines between the lines as a fraction of the width of the lines, 0 to 1.
+            Width of the new lines as a fraction of the width of the existing lines, 0 to 1.
         """
         look, spacing = self._look, ratio * self._spacing
         lines = cached_surface_lines(self._instance, look.display, spacing, self._cache)

@@ -58,7 +58,7 @@ SEED_SPACING_FACTOR = 1.1
 #: remaining lines.
 RESEED_FACTOR = 1.75
 
-#: Maximum fraction of the lines (states without regard to sign) that no streamline has passed after the last
+#: Maximum fraction of the lines (pairs of opposite states) that no streamline has passed after the last
 #: round: in general, and for antialiased pictures. These lines take the average of a neighbor.
 MAX_UNCOVERED_FRACTION, FINE_UNCOVERED_FRACTION = 0.15, 0.05
 
@@ -210,7 +210,7 @@ def _crop_rows(field: PixelField, extent: slice) -> PixelField:
 class _LineAverages:
     """Averages of noise along each line (pair of opposite directions) of each cell of the covering surface.
 
-    Stored are the average times the effective samples, and the effective samples. The effective samples
+    For each line, the product of average and effective samples is stored, and the effective samples. These
     are 0 for a line that has no average yet, and -1 for a line that needs none.
 
     Parameters
@@ -302,10 +302,10 @@ class _LineAverages:
         return slopes
 
     def _known_values(self, line: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Return the (n, K + 1) values of lines with the (n,) indices `line`.
+        """Return the (n, K + 1) stored values of lines, or values of `own` where a line has no average.
 
-        Where a line has no average, because its effective samples, in the last column, are not above 0, they
-        are the values of the same row of `own`, (n, K + 1).
+        `line` holds the (n,) indices of the lines. Row i of `own`, (n, K + 1), replaces the values of
+        ``line[i]``. A line has no average if its effective samples, in the last column, are not above 0.
         """
         values = self._flat.take(line, axis=0)
         unknown = np.flatnonzero(values[:, -1] <= 0)
@@ -365,7 +365,8 @@ def _cover_all_lines(
     for forward, left in FILL_OFFSETS:
         (source,) = covering.neighbor_lines(missing, [(forward, left)])
         missing, *_ = [table.copy_from(missing, source) for table in averages]
-    # Each line whose neighbors have no average either gets a streamline for itself alone (no half window).
+    # The neighbors of these lines have no average, either. Each line gets a streamline of its own, which sets
+    # no other average (half window 0).
     batch_size = min(_batch_size(look.streamline_reach()), len(missing))
     batch = StreamlineBatch(covering, looks, step_limits, 0, batch_size, fine)
     for batch_seeds in _batches(missing, batch_size):

@@ -59,7 +59,7 @@ MIN_COVERAGE = 1e-3
 
 
 class HatchedLines(NamedTuple):
-    """The lines of a field that ink is drawn with, what makes them uneven, and the outline.
+    """The input of hatching: streaks or even lines, what makes them uneven, and the outline.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class HatchedLines(NamedTuple):
     even_lines: EvenLines | None = None
 
     def part(self, extent: slice) -> HatchedLines:
-        """Return the lines and what makes them uneven at the pixels `extent`."""
+        """Return the input of hatching at the pixels `extent` only."""
         return HatchedLines(self.look, *(_part(values, extent) for values in self[1:]))
 
     def relief(self, line: int) -> np.ndarray | np.float32:
@@ -320,7 +320,7 @@ def has_breaks(look: Any) -> bool:
 def line_images(
     look: PixelLook, convolve: Callable[[list[PixelLook]], list[LicImages]]
 ) -> tuple[LicImages | None, LicImages | None]:
-    """Compute the LIC images that the lines of a look are drawn with.
+    """Compute the LIC images for a look with ink: of its lines, and of the breaks in lines.
 
     Parameters
     ----------
@@ -331,9 +331,10 @@ def line_images(
 
     Returns
     -------
-    images, break_images : LicImages or None
-        Images of the lines; None if lines are evenly spaced, as these need no noise. Images of shorter streamlines, which tell where lines
-        break; None if lines do not break.
+    images : LicImages or None
+        Images of the lines. None if lines are evenly spaced, because these need no noise.
+    break_images : LicImages or None
+        Images with shorter streamlines, which determine where lines break. None if lines do not break.
     """
     looks = [] if is_even(look) else [look]
     if has_breaks(look):

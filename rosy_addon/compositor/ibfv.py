@@ -199,7 +199,7 @@ def _full_decay(field: PixelField, look: PixelLook) -> np.float32:
 def _decay(field: PixelField, look: PixelLook) -> np.ndarray:
     """Return the float32 ratio q of the weights of successive steps.
 
-    (P,) if the length of streamlines depends on the magnitude; () otherwise.
+    The shape is (P,) if the length of streamlines depends on the magnitude, otherwise ().
     """
     limits = magnitude_step_limits(field, look)
     if limits is None:

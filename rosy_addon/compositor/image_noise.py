@@ -122,9 +122,9 @@ class NoiseSettings(NamedTuple):
 
 
 class TileRectangle(NamedTuple):
-    """A rectangle of the picture that consists of whole tiles: rows from the bottom, in pixels.
+    """A rectangle of the picture that consists of whole tiles: its columns and rows of pixels.
 
-    `right` and `top` are the column and the row after the last ones.
+    Rows are counted from the bottom. `right` and `top` are the column and the row after the last ones.
     """
 
     left: int
@@ -281,9 +281,9 @@ def gaussian_blur(
 
 
 def _box_filter(image: np.ndarray, radius: int, outside: str) -> np.ndarray:
-    """Return the mean of each pixel and the `radius` pixels above and below it, (H, W) float64.
+    """Return the (H, W) float64 means over 2 `radius` + 1 rows: each pixel with those above and below it.
 
-    `outside` is what lies outside of the image: "edge" for its border pixels, "mean" for `NOISE_MEAN`.
+    `outside` sets the rows outside of the image: "edge" repeats its border rows, "mean" is `NOISE_MEAN`.
     """
     low, high = (image[0], image[-1]) if outside == "edge" else (NOISE_MEAN, NOISE_MEAN)
     window = 2 * radius + 1

@@ -55,11 +55,11 @@ LEAST_SHARE = 0.003
 #: Lower bound of densities that are divided by.
 LEAST_DENSITY = np.float32(1e-6)
 
-#: Two lines do not swap places where the share of each place differs by less than this from 0 or 1.
+#: Two lines do not swap where their weights at each place differ by less than this from 0 or 1.
 MAX_ROUNDING = 1e-3
 
-#: Where two lines swap, the one that gets the later place joins its layer while its share of that place
-#: rises from 0.5 to this, and leaves the earlier layer while it rises from this to 1.
+#: Where two lines swap, one moves to the later place. It joins the later layer while its weight at that place
+#: rises from 0.5 to this, and leaves the earlier layer while the weight rises from this to 1.
 LAYER_CHANGE = 0.75
 
 
@@ -169,14 +169,15 @@ def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarra
 
 
 def cyclic_places(first: np.ndarray) -> np.ndarray:
-    """Return how much each line has each place in the order, if line m + 1 follows line m.
+    """Return the weight of each line at each place in the order, if line m + 1 always follows line m.
 
-    The result is (min(M, MAX_LAYERS), M, P) float32: the `places` of `ordered_thresholds`.
+    Line 0 follows the last line. The result is (min(M, MAX_LAYERS), M, P) float32: the `places` of
+    `ordered_thresholds`.
 
     Parameters
     ----------
     first : (M, P) float32 ndarray
-        How much each line has the first place in the order, 0 to 1. The sum over the lines is 1.
+        Weight of each line at the first place, 0 to 1. The sum over the lines is 1.
     """
     return np.stack([np.roll(first, place, axis=0) for place in range(min(len(first), MAX_LAYERS))])
 
@@ -191,8 +192,8 @@ def ordered_thresholds(
     thresholds : (M, P) float32 ndarray
         Thresholds of each line, from `line_thresholds`.
     places : (L, M, P) float32 ndarray
-        For each of the first L = min(M, MAX_LAYERS) places in the order, how much each line has it. The
-        sum over the lines is 1.
+        Weight of each line at each of the first L = min(M, MAX_LAYERS) places in the order: 1 for the line
+        that has the place, between 0 and 1 where two lines swap. The sum over the lines is 1.
     undefined : (P,) bool ndarray
         Where the field is undefined. The thresholds of the first line hold for all ink together there.
     look : PixelLook
@@ -219,10 +220,11 @@ def ordered_thresholds(
 
 
 def _layer_densities(layers: int, layering: float) -> np.ndarray:
-    """Tabulate the (layers, DENSITY_STEPS) float32 density of each layer, by the total density `DENSITIES`.
+    """Return the (layers, DENSITY_STEPS) float32 density of each layer, for each total density `DENSITIES`.
 
     Density is -log(transmittance). Each row increases strictly. Beyond the table it continues linearly.
-    `layers` is their number, `layering` the difference in darkness between the tones at which they join.
+    `layers` is the number of layers, `layering` the difference in darkness between the tones at which they
+    join.
     """
     shares = np.stack(layer_shares(-np.expm1(-DENSITIES), layers, layering))
     return (DENSITIES * np.maximum(shares, LEAST_SHARE)).astype(np.float32)
@@ -249,7 +251,7 @@ def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray
     density : (M, P) float32 ndarray
         -log(1 - threshold) of each line.
     places : (L, M, P) float32 ndarray
-        For each of the L layers that are drawn, how much each line has that place in the order, 0 to 1.
+        Weight of each line at each of the L places that are drawn, as in `ordered_thresholds`.
     table : (L, DENSITY_STEPS) float32 ndarray
         From `_layer_densities`.
 
@@ -270,7 +272,7 @@ def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray
     index = np.minimum(index, DENSITY_STEPS - 2)
     low, high = line_density(index), line_density(index + 1)
     begin = DENSITIES[1] * (index + (density - low) / np.maximum(high - low, np.float32(1e-7)))
-    # How much each line has one of these places or a later one.
+    # Weight of each line at this place and all later ones, as a fraction of its weight at all places.
     total = np.maximum(places.sum(axis=0), np.float32(1e-6))
     onward = np.cumsum(places[::-1], axis=0)[::-1] / total
     onward[0] = 1
@@ -411,12 +413,11 @@ def _streak_sample(images: LicImages | None, node: float) -> LicImages | None:
 def _even_sample(
     lines: EvenLines, is_coarse: np.ndarray, node: float
 ) -> tuple[EvenLines, np.ndarray]:
-    """Sample even lines `node` half pixels beside the centers of pixels, across the lines.
+    """Sample even lines beside the centers of pixels; also return the (M, P) distances between lines.
 
-    `node` is a position of `PIXEL_NODES`, from -1 to 1.
-
-    `is_coarse`, (M, P) bool, says where coarse lines (at a larger distance) replace them. The result is the
-    sampled lines, and the distance between the lines at each pixel, (M, P).
+    The samples are `node` half pixels from the centers, across the lines. `node` is a position of
+    `PIXEL_NODES`, from -1 to 1. Where `is_coarse`, (M, P) bool, is true, the coarse lines, which are
+    farther apart, are sampled instead.
     """
     streaks, period = lines.streaks, lines.period
     if lines.coarse_streaks is not None:

@@ -100,7 +100,7 @@ def has_tone_inks(look: Any) -> bool:
 
 
 def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
-    """Return the arguments of most settings of the panel "Ink"; `applies`: when they have an effect."""
+    """Return the arguments that settings of the panel "Ink" share; `applies` tells when they have an effect."""
     return shading_arguments("ink", applies)
 
 

@@ -1,4 +1,4 @@
-"""`PixelLook`: a look with its lengths in pixels of the frame that is drawn. Other changes of scale."""
+"""`PixelLook`: a look with its lengths in pixels of the frame that is drawn; and functions that scale looks."""
 
 from __future__ import annotations
 
@@ -213,7 +213,7 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
     step : float
         Length of a step of streamlines, in Blender units.
     pixel : float
-        Blender units that stand for a pixel. A picture is `MESH_PIXELS` wide.
+        Length on the surface, in Blender units, for a pixel of a picture that is `MESH_PIXELS` pixels wide.
     drift : Drift
         How far the streaks have drifted.
     """
@@ -227,9 +227,9 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
 
 
 def unit_in_pixels(look: Look, width: float) -> float:
-    """Return the pixels of a picture, `width` pixels wide, that a length of 1 of a look stands for.
+    """Return the size, in pixels, of a length of 1 in a look, for a picture that is `width` pixels wide.
 
-    It is 1 if lengths are in Blender units.
+    The size is 1 if the lengths of the look are in Blender units.
     """
     if look.unit == "percent":
         return (look.unit_size or 100 / REFERENCE_WIDTH) / 100 * width
@@ -239,7 +239,7 @@ def unit_in_pixels(look: Look, width: float) -> float:
 
 
 def in_percent(look: Look, width: int) -> Look:
-    """Return a look in percent of the width of a picture, `width` pixels wide, if it is in millimeters."""
+    """Convert a look in millimeters to percent of `width`, the width of a picture in pixels; keep other looks."""
     if look.unit != "millimeters":
         return look
     return replace(look, unit="percent", unit_size=100 * unit_in_pixels(look, width) / width)

@@ -32,8 +32,8 @@ DEPTH_JUMP = 2.0
 #: of depth from the pixels at the step to the next ones.
 MIN_STEP, STEP_RATIO = 6.0, 2.0
 
-#: Lengths in pixels of the finished picture: a shorter mark than the first is not drawn, and from the second
-#: on a mark has its full width. So marks grow and shrink when something moves, but do not flicker.
+#: Lengths of marks, in pixels of the finished picture. Marks shorter than the first are not drawn, marks longer
+#: than the second have their full width, and the width grows in between, so that marks do not flicker.
 MIN_MARK_LENGTH, FULL_MARK_LENGTH = 6, 12
 
 #: Maximum number of samples of pixels in a band that is processed at once.

@@ -307,8 +307,8 @@ def direction_table(
     direction : (P,) complex64 ndarray
         Directions on screen.
     member : (P,) complex64 ndarray
-        The same directions rotated into the view plane, where they are at equal angles. A neighbor that differs by more than half the angle
-        between members is on another member, and is ignored.
+        The same directions rotated into the view plane, where members are at equal angles. A neighbor that
+        differs by more than half the angle between members is on another member, and is ignored.
     degree : int
         Degree of the field.
     neighbors : (9, P + 1) int32 ndarray

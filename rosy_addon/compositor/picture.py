@@ -26,7 +26,7 @@ class Picture:
     ----------
     rgba : (H, W, 4) float32 ndarray
         Linear, not premultiplied, the bottom row first, as in Blender. Alpha is the fraction of the
-        pixel in which a field is visible. If the paper is not opaque, this is multiplied by the opacity of
+        pixel in which a field is visible. If the paper is not opaque, alpha is multiplied by the opacity of
         ink and paper.
     spread : (H, W) float32 ndarray or None
         The fourth channel of `ink_thresholds.threshold_pixels`, if the picture has thresholds of ink in place

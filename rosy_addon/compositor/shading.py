@@ -76,7 +76,7 @@ class Light:
         return self.strength * np.maximum(dot(normal, normalize(to_light)), 0) / distance_squared
 
 
-#: Most triangles on which lights are metered; of more, every second, third and so on is used.
+#: Largest number of triangles on which lights are metered. If there are more, only every n-th one is used.
 METERED_TRIANGLES = 20_000
 
 #: The light of a look whose `light` is "lamp": a sun over the left shoulder of the viewer.
@@ -95,7 +95,8 @@ def lights_of(look: Any, lights: Sequence[Light]) -> Sequence[Light]:
 def light_source(look: Any, lights: Sequence[Light]) -> str:
     """Return the light of a look or a style of strokes, given the lights of the scene.
 
-    If the setting `light` is "scene", but there are no lights, soft streaks have the headlight, and ink the lamp.
+    It is the setting `light`. If that is "scene" and there are no lights, it is "headlight" for soft streaks and
+    "lamp" for ink and strokes.
     """
     if look.light != "scene" or lights:
         return look.light
@@ -119,7 +120,7 @@ def metered(
     lights : sequence of Light
         In world space.
     instances : sequence of MeshInstance
-        The surface is that of the instances with a field.
+        Only the surfaces of instances with a field are used.
     exposure : float
         Further scale, in stops: 1 doubles the light.
     """

@@ -22,7 +22,7 @@ from .undirected import disc_means
 #: crispness 0 and 1.
 MAX_SOFTNESS, MIN_SOFTNESS = 1.6, 0.2
 
-#: What is subtracted from streaks, of standard deviation 1, to be below the threshold of any coverage.
+#: Number that is subtracted from streaks (standard deviation 1), which puts them below all thresholds.
 NO_INK = 1e6
 
 #: `break_amount` that a wobble of 1 adds everywhere.

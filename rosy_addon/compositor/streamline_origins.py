@@ -48,9 +48,9 @@ class Origins(NamedTuple):
         return Origins(*(values.take(state) for values in self))
 
     def put(self, state: np.ndarray, origins: Origins) -> None:
-        """Replace the origin of the state (a pixel with a direction) with the index `state[i]`, for each i.
+        """Set the origins of the states (pixels with a direction) that have the given indices.
 
-        Element i of `origins` takes its place.
+        The origin of the state ``state[i]`` becomes element i of `origins`.
         """
         for values, new in zip(self, origins, strict=True):
             values[state] = new
@@ -188,8 +188,8 @@ class Sheets:
             between -= rows * width
             distance.real += between
             distance.imag += rows
-            # If a neighbor has its origin elsewhere, the distance of both origins is taken to be that of the
-            # pixels.
+            # Where streamlines have parted, the offset between the two pixels replaces the offset between
+            # their origins.
             apart = np.abs(distance.view(np.float32))
             parted = np.maximum(apart[::2], apart[1::2]) > MAX_PARTING
             parted |= cells == SINK_CELL

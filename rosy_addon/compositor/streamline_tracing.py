@@ -226,10 +226,11 @@ class TracedLanes:
 
 
 class _LoopFinder:
-    """A detector of streamlines that return to an earlier state, after about one more turn of the loop.
+    """A detector of streamlines that run in a loop: they return to an earlier state.
 
-    Each new state is compared with one earlier state of the streamline. That state is replaced by the current
-    one at steps that are powers of two (Brent, An improved Monte Carlo factorization algorithm, 1980).
+    A loop is found about one turn after the streamline has closed it. Each new state is compared with one
+    earlier state of the streamline. The earlier state is replaced by the current one whenever the number of
+    steps has doubled (Brent, An improved Monte Carlo factorization algorithm, 1980).
     """
 
     def __init__(self) -> None:

@@ -45,7 +45,7 @@ class Strip(NamedTuple):
     def averaged_rows(self) -> tuple[int, int]:
         """The rows whose pixels get averages of streamlines: the first row, and the row after the last.
 
-        They begin with the strip and end `OVERLAP_ROWS` above it: `drawn_rows`, and `BORDER_ROWS` more.
+        They are the strip and `OVERLAP_ROWS` rows above it: `drawn_rows`, and `BORDER_ROWS` more.
         """
         return self.start, min(self.stop + OVERLAP_ROWS, self.height)
 

@@ -243,7 +243,7 @@ def feature_scale(
 def octave_weights(octave_offset: np.ndarray) -> np.ndarray:
     """Compute the weights of octaves of noise in the blend.
 
-    `octave_offset` is the distance of the octave from the level of the pixel, in octaves.
+    `octave_offset` is the base-2 logarithm of the cell size of the octave, relative to the cell size at the pixel.
 
     The squares of the weights of the `OCTAVES` octaves sum to 1, so the variance of the blend is
     the same as for a single octave.

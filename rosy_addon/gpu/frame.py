@@ -70,8 +70,8 @@ class Frame:
     textures : dict of str to texture
         Results of the passes so far, by their names in shaders.
     prepared : dict
-        Handles of data that was computed from the meshes for this picture. The keys are defined by the
-        functions of the stages that return lookups, such as `noise_stage.feature_lookups`.
+        Handles of data on the device that was computed from the meshes for this picture. Its keys are the
+        keys of the lookups from `noise_stage.feature_lookups` and similar functions of other stages.
     passes : list of FramePass
         The passes that are still to be run, including the passes over the samples.
     """

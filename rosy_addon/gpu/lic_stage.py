@@ -30,10 +30,10 @@ MAX_DISPATCH_STEPS = 1 << 29
 
 
 def even_line_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
-    """Return functions that look up the evenly spaced lines of instances, by the keys of `Frame.prepared`.
+    """Return a dict from keys of `Frame.prepared` to functions that look up the evenly spaced lines of instances.
 
-    Each calls `GpuResources.line_records`: it returns the lines, or a `Preparation` if they are not on the
-    device. There are no functions if the look does not draw evenly spaced lines.
+    Each function returns the result of `GpuResources.line_records`: the lines, or a `Preparation` if they are
+    not on the device. The dict is empty if the look does not draw evenly spaced lines.
     """
     look = frame.look
     if not is_even(look):
@@ -172,9 +172,10 @@ def _trace(
 def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
     """Render the covering of the fields of one kind, and return its images by name.
 
-    ``cells`` holds the phase and the noise of each pixel. The phase is 2 plus the angle of a member, in turns
-    from the guiding angle and with wobble, times the number of sheets. Its lowest bits are a mask of the
-    neighbors to which the field continues. It is 0 at pixels without a field of this kind.
+    ``cells`` holds the phase and the noise of each pixel. The phase is 2 + S a / (2 pi), with S the number of
+    sheets, and a the angle from the guiding angle to the nearest member, rotated by the wobble. The lowest bits
+    of the phase are a mask of the neighbors to which the field continues. It is 0 at pixels without a field of
+    this kind.
 
     ``directions`` has a layer for each line direction, with its vector on screen. ``angle_gradients`` has the
     same layers: x and y of the vector, and the derivatives of its angle along x and y, in radians per pixel.

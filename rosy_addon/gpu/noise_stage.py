@@ -19,10 +19,10 @@ from .uniforms import noise_uniforms, surface_cell_uniforms, wobble_uniforms
 
 
 def feature_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
-    """Return functions that look up the curvatures of surfaces, by the keys of `Frame.prepared`.
+    """Return a dict from keys of `Frame.prepared` to functions that look up the curvatures of surfaces.
 
-    Each calls `GpuResources.feature_curvature`: it returns a texture, or a `Preparation` if the curvature is
-    not on the device. There are no functions if the noise does not depend on the curvature.
+    Each function returns the result of `GpuResources.feature_curvature`: a texture, or a `Preparation` if the
+    curvature is not on the device. The dict is empty if the noise does not depend on the curvature.
     """
     if frame.look.anchor != "surface" or not frame.look.detail:
         return {}

@@ -14,10 +14,10 @@ from .uniforms import clip_uniforms, min_normal_cosine
 
 
 def outline_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
-    """Return functions that look up the creases of instances, by the keys of `Frame.prepared`.
+    """Return a dict from keys of `Frame.prepared` to functions that look up the creases of instances.
 
-    Each calls `GpuResources.outline_textures`: it returns `OutlineTextures`, or a `Preparation` if they are
-    not on the device. There are no functions if the look has no outline.
+    Each function returns the result of `GpuResources.outline_textures`: `OutlineTextures`, or a `Preparation`
+    if they are not on the device. The dict is empty if the look has no outline.
     """
     if not has_outline(frame.look):
         return {}

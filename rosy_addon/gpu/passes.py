@@ -180,7 +180,7 @@ class RasterPass:
 
 @cache
 def all_passes() -> tuple[ComputePass | RasterPass, ...]:
-    """Return all shader passes: one for each compute shader, and one for each pair of other shaders."""
+    """Return all shader passes: one for each compute shader, one for each vertex and fragment shader pair."""
     kinds = {".comp.glsl": ComputePass, ".vert.glsl": RasterPass}
     return tuple(
         kind(path.name.removesuffix(end))

@@ -43,13 +43,14 @@ def prepare_steps(
     device : Device, optional
         The device on which the shaders are compiled.
     shaders : sequence of ComputePass or RasterPass
-        Shaders to compile before, unless they are compiled already.
+        Shaders to compile first, unless they are compiled already.
 
     Yields
     ------
     Call or Step
-        For a call that takes longer than `IN_PLACE_SECONDS`, the `Call`. The caller makes it, and sends its
-        result. For a shorter call, a `Step` with its label; then the call is made here.
+        A `Call` that takes longer than `IN_PLACE_SECONDS`: the caller makes it, and passes the result to
+        ``send`` of this generator. Before a shorter call, a `Step` with its label: the generator makes the
+        call itself.
 
     Returns
     -------

@@ -74,8 +74,8 @@ class GpuMesh:
     tone_atlas : MipAtlas or None
         The image that the tone is sampled from. None if the tone has no image.
     instance : MeshInstance
-        The instance whose mesh was sent. This reference keeps its arrays alive: they are identified by
-        their ids in `GpuResources`, so the ids must not be used again.
+        The instance whose mesh was sent. `GpuResources` identifies its arrays by `id`. This reference keeps
+        them alive, so that no new array gets the same id.
     """
 
     buffers: MeshBuffers
@@ -142,7 +142,7 @@ class GpuResources:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        #: By key: a handle on the device, and the number of the upload until which it stays there unused.
+        #: By key: a handle on the device, and the number of the upload after which it is freed if it is not used.
         self._kept: dict[Hashable, tuple[Any, int]] = {}
         self._lookup_textures: dict[str, tuple[Any, Any]] = {}
         self._upload_count = 0
@@ -206,7 +206,7 @@ class GpuResources:
         Raises
         ------
         RosyError
-            By the function `Preparation.send`, if there are too many creases or triangles for the device.
+            Raised by `Preparation.send` if there are too many creases or triangles for the device.
         """
         surface = item.instance.surface
         linear, _ = split_matrix(item.instance.matrix)
@@ -245,7 +245,7 @@ class GpuResources:
         Raises
         ------
         RosyError
-            By the function `Preparation.send`, if the lines do not fit into a texture.
+            Raised by `Preparation.send` if the lines do not fit into a texture.
         """
         surface, field = item.instance.surface, item.instance.field
 

@@ -163,7 +163,7 @@ def _transport_member(
     Returns
     -------
     (n,) complex128 ndarray
-        In these frames. Zero for a rest face without area.
+        The transported vectors in the tangent frames `frame`. Zero for a rest face without area.
 
     Notes
     -----

@@ -104,8 +104,8 @@ class SurfacePoints(NamedTuple):
 class PixelCoverage(NamedTuple):
     """The fractions of pixels that surfaces cover, for the P pixels of a G-buffer.
 
-    A pixel has several samples. A sample that a surface covers shows the surface that the G-buffer has at
-    its pixel. E samples, however, show the surface that the G-buffer has at a neighboring pixel.
+    A pixel has several samples. Most covered samples show the surface that the G-buffer stores for their own
+    pixel. The E others show the surface that it stores for a neighboring pixel; they are listed.
 
     Attributes
     ----------
@@ -222,13 +222,15 @@ class GBuffer:
         return [0 if field is None else field.degree for field in fields]
 
     def part(self, extent: slice) -> GBuffer:
-        """Return the G-buffer of some of the pixels, without a copy and without their samples."""
+        """Return the G-buffer of the pixels `extent`: views of the arrays, without `coverage` and `samples`."""
         return replace(part_of(self, extent), coverage=None, samples=None)
 
     def instance_blocks(
         self,
     ) -> list[tuple[int, MeshInstance, list[slice | np.ndarray], tuple[float, float]]]:
-        """Return a tuple for each visible mesh instance, in the order of instances: its pixels, in blocks.
+        """Return the pixels of each visible mesh instance, in blocks: a list with a tuple for each instance.
+
+        The instances are in ascending order of their index. The tuples have these elements:
 
         Returns
         -------

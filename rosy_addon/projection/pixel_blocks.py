@@ -34,7 +34,7 @@ def reported_blocks(
     label : str
         Name of the step, for a status bar.
     start, stop : float
-        Progress before the first and after the last block, from 0 to 1 of the work of the caller.
+        Progress before the first and after the last block, as fractions of the caller's work.
     size : int
         Largest number of pixels in a block.
     """

@@ -41,9 +41,9 @@ class PixelTable:
         self._entry[self._cell] = np.arange(len(self._cell), dtype=np.int32)
 
     def beside(self, entry: np.ndarray, dx: int, dy: int) -> np.ndarray:
-        """Return the indices of the pixels dx columns right and dy rows above others; -1 where there is none.
+        """Return the pixels `dx` columns to the right of, and `dy` rows above, the pixels `entry`.
 
-        These indices and `entry`, the indices of the others, are indices into the G-buffer.
+        All are indices into the G-buffer. The result is -1 where there is no pixel.
         """
         return self._entry.take(self._cell[entry] + (dy * self._stride + dx))
 

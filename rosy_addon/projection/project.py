@@ -273,7 +273,7 @@ def _visible_pixels(instances: MeshInstances, camera: Camera, rows: Rows) -> Fra
 def _visible_samples(
     instances: MeshInstances, camera: Camera, samples: int, rows: Rows
 ) -> tuple[Fragments, SampledTriangles]:
-    """Find the visible triangles at the center of each pixel, and those at all samples."""
+    """Find the main triangle of each pixel (see `SampledTriangles`), and the visible triangles at all samples."""
     clip, triangles = all_triangles(instances, camera)
     has_field = _triangles_with_field(instances)
     with progress(0.0, 0.8):

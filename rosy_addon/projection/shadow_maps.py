@@ -44,7 +44,7 @@ def light_cameras(
     Parameters
     ----------
     instances : sequence of MeshInstance
-        All shadow casters. Those with a field are the receivers, which the shadow maps cover.
+        All shadow casters. Instances with a field are the receivers, which the shadow maps cover.
     camera : Camera
         The camera in whose space `vector` is given.
     kind : {"sun", "point"}

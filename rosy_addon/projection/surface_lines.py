@@ -50,10 +50,10 @@ class SurfaceLines:
     pattern : StripePattern
         Phases on the L leaves.
     heading : (2, L) float32 ndarray
-        The member of the field in each leaf that belongs to family 0 of `pattern`, a unit vector after
-        `stretch` of `surface_lines`. The other families follow counter-clockwise. The two components are
-        multiples of two sides of the surface's triangle, from corner 0 to corner 1 and from corner 0 to
-        corner 2. 0 where the field is undefined.
+        The member of the field in each leaf that belongs to family 0 of `pattern`: a unit vector in the shape
+        on which distances are measured (see `surface_lines`). The other families follow counter-clockwise.
+        The two components are coefficients of two sides of the surface's triangle: corner 0 to 1, and corner
+        0 to 2. 0 where the field is undefined.
     """
 
     tree: BisectionTree
@@ -169,8 +169,7 @@ def _leaf_directions(
     directions : CornerDirections
         Directions of the field at the corners of the leaves, in the planes of the surface's triangles.
     heading : (2, L) float32 ndarray
-        A member of the field in each leaf, as multiples of two sides of the surface's triangle; see
-        `SurfaceLines`.
+        `SurfaceLines.heading`.
     """
     frame = tangent_frame_components(corner_field.geometric_normal)
     sides = (corners - corners[:, :1]).transpose(1, 2, 0)

@@ -1,1 +1,1 @@
-"""Rendering: the input of renderers, their protocols, and the numpy renderer."""
+"""Rendering: the input and the interface of renderers, and the numpy renderer."""

@@ -81,10 +81,10 @@ def draw_picture(
 
 
 def joined_pictures(pictures: Sequence[Picture]) -> Picture:
-    """Return one picture of several, each of which shows other meshes of the same scene.
+    """Join pictures that show different meshes of the same scene into one picture.
 
-    Where a pixel shows several, its color is their mean, weighted by opacity. The color range and the marks
-    are those of the first picture that has some.
+    The color of a pixel is the mean over the pictures, weighted by opacity. Opacities are added, up to 1. The
+    color range is taken from the first picture that has one, and so are the marks.
     """
     if len(pictures) == 1:
         return pictures[0]
@@ -124,7 +124,7 @@ def _draw_fields(
 ) -> Picture:
     """Draw the picture without arrowheads and singularities.
 
-    `cache` keeps results that do not depend on the camera, and `gbuffer_cache` the others, if given.
+    `cache` keeps results that do not depend on the camera. `gbuffer_cache` keeps all other results.
     """
     check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
     if not view.draws_thresholds:
@@ -201,8 +201,8 @@ def _draw_strips(
     """Draw neighboring strips, and return a picture of their rows.
 
     The meshes are also projected to some rows above and below the strips, because streamlines that begin in
-    the strips may reach them. `cache` keeps results that do not depend on the camera, and `gbuffer_cache` the
-    others, if given.
+    the strips may reach them. `cache` keeps results that do not depend on the camera. `gbuffer_cache` keeps
+    all other results.
     """
     camera, look = view.shaded_camera, view.look
     scene = view.instances, camera, look.display

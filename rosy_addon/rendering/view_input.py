@@ -44,8 +44,8 @@ class ViewInput:
     look : Look
         Settings of the drawing.
     looks : tuple of Look
-        The look of each instance, if they differ; those of instances without a field are not used. Empty if
-        `look` is the look of all.
+        The look of each instance, if they differ. Looks of instances without a field are not used. Empty if
+        all instances have the look `look`.
     lights : tuple of Light
         In camera space. Only used if `Look.light` is "scene".
     reference : ReferenceRender or None
@@ -70,7 +70,7 @@ class ViewInput:
     looks: tuple[Look, ...] = ()
 
     def by_look(self) -> list["ViewInput"]:
-        """Return a view for each look. In it, the meshes with other looks have no field: they only hide others."""
+        """Return a view for each look, in which meshes with other looks have no field and only hide others."""
         if not self.looks:
             return [self]
         entries = list(zip(self.instances, self.looks, strict=True))

@@ -53,8 +53,7 @@ from .texels import (
     texture_frame,
 )
 
-#: Fraction of the texels, those that are smallest on the surface, that may be smaller than a step of a
-#: streamline.
+#: Fraction of the texels that may be smaller on the surface than a step of a streamline.
 FINE_FRACTION = 0.05
 
 #: Smallest length of a step of a streamline, as a multiple of the mean size of a texel on the surface.

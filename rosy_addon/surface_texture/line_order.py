@@ -262,9 +262,9 @@ def _first_lines(
 ) -> LineOrder:
     """Choose for each refined triangle which line direction comes first.
 
-    It is the direction that is near to the guiding angle. If the field itself marks one of its line
-    directions (`TangentMesh.family_z`), it is this direction. The angle is in radians from the horizontal
-    direction. `blend` is the width of the strip in which two line directions swap, in Blender units.
+    If the field itself marks one of its line directions (`TangentMesh.family_z`), the marked one comes first,
+    otherwise one near to the guiding angle. The angle is in radians from the horizontal direction. `blend` is
+    the width of the strip in which two line directions swap, in Blender units.
     """
     degree = mesh.degree // mesh.family_count
     tree = refined.tree

@@ -116,7 +116,7 @@ def main(
 def main_in_extension(argv: Sequence[str]) -> int:
     """Run a command of Blender's own command line, and return its exit status.
 
-    Blender without a window ignores Ctrl-C, so that a command would go on.
+    Ctrl-C interrupts the command. Without this, Blender ignores it if it has no window.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)
     return main(argv)

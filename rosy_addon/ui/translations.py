@@ -42,7 +42,7 @@ def read_translations(path: Path) -> Messages:
     Raises
     ------
     RosyError
-        If the file cannot be read, or a line is not that of a .po file without plurals.
+        If the file cannot be read, or a line does not belong in a .po file. Plurals are not supported.
     """
     try:
         lines = read_bytes(path).decode("utf-8").splitlines()
@@ -72,7 +72,7 @@ def read_translations(path: Path) -> Messages:
 
 
 def register() -> None:
-    """Give Blender the translations. For a file that cannot be read, say so, and keep the English texts."""
+    """Register the translations with Blender. Print an error for each file that cannot be read, and skip it."""
     languages = {}
     for path in sorted(FOLDER.glob("*.po")):
         try:
@@ -85,5 +85,5 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take the translations from Blender."""
+    """Remove the translations from Blender."""
     bpy.app.translations.unregister(EXTENSION_ID)

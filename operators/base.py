@@ -179,7 +179,7 @@ class RosyOperator:
         name : str, optional
             Name of the attribute. By default the existing field of each mesh is replaced.
         targets : dict of bpy.types.Mesh to list of bpy.types.Object, optional
-            By mesh, the objects that then have their fields on it; see `field_targets`.
+            For each mesh, the objects whose fields it will hold; see `field_targets`.
 
         Raises
         ------

@@ -278,15 +278,15 @@ def from_array(
     name : str, optional
         Name of the array; not needed for files that `Field.save` wrote. If the vertices and the faces both
         have an array NAME, "point:NAME" is the array of the vertices, and "cell:NAME" the array of the faces.
-        By default, if only one array can be a field, it is used. Arrays of integers and normals cannot.
+        By default, the only array that can be a field is used. Integers and normals cannot be a field.
     degree : int, optional
         N, from 1 to 12; by default 1 for an array of vectors. Tensors have degree 4.
     nonfinite : {"error", "zero"}
         Raise an error if a number is not finite, or treat the vector or tensor as undefined.
     off_surface : {"error", "project", "undefined"}
-        What to do about vectors off the surface; see `from_vectors`. Only here, "error" means: if they are
-        too many, replace all vectors by their tangential components if an element has one vector, and raise
-        an error if it has all N directions.
+        What to do about vectors off the surface, as in `from_vectors`. But if a row has one vector, "error"
+        raises no error: if too many vectors are off the surface, all of them are replaced by their tangential
+        components, and a `RosyWarning` says so.
 
     Raises
     ------

@@ -85,7 +85,7 @@ def hold_fields(targets: FieldTargets) -> None:
 
 
 def _discard(meshes: Iterable[Mesh]) -> None:
-    """Delete those of some meshes that are field meshes and have no users."""
+    """Delete the given meshes that are field meshes and have no users."""
     for mesh in meshes:
         with suppress(ReferenceError):  # deleted
             if mesh.get(_TAG) and not mesh.users:

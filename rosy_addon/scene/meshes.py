@@ -233,7 +233,7 @@ def evaluated_mesh(obj: Object) -> Iterator[Mesh | None]:
 
 
 def is_shaded_flat(mesh: Mesh) -> bool:
-    """Return whether a mesh has more than `FEW_FACES` faces, of which the first one is shaded flat.
+    """Return whether a mesh has more than `FEW_FACES` faces, and its first face is shaded flat.
 
     Only one value is read, so that panels can call this at each redraw.
     """

@@ -146,7 +146,7 @@ def new_material(
             shader = build.mix_shaders(coverage, transparent, shader)
     build("ShaderNodeOutputMaterial", {"Surface": shader})
     if has_clear_paper(look) and hasattr(material, "cycles"):
-        # Ink is no lamp: to sample it makes the rest noisier.
+        # Ink is not a light source. If Cycles samples it as one, renders are noisier.
         material.cycles.emission_sampling = "NONE"
     return material
 

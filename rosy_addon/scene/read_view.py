@@ -124,7 +124,7 @@ def scene_depsgraph(scene: Scene) -> Depsgraph:
 def lights_for(
     scene: Scene, depsgraph: Depsgraph, look: Any, instances: Sequence[MeshInstance]
 ) -> tuple[Light, ...]:
-    """Return the lights of a scene in world space, scaled to the surface brightness of mesh instances (`metered`).
+    """Return the lights of a scene in world space, scaled by `metered` to the brightness of mesh instances.
 
     `look` is a `Look` or a `StrokeStyle`. If it does not use the lights of the scene, the result is empty.
     """

@@ -6,7 +6,7 @@ from bpy.types import Material, Mesh, Node, NodeTree, Object
 from ..field.surface import Surface
 from .meshes import material_indices
 
-#: Shader nodes through which one sees what is behind them.
+#: Types of shader nodes that are transparent.
 _TRANSPARENT_NODES = ("BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION")
 
 #: Inputs of *Principled BSDF*, and the values with which it is opaque.

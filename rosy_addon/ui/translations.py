@@ -21,7 +21,7 @@ FOLDER = Path(__file__).parent / "locale"
 #: Blender's context of most texts, which .po files leave out. Labels of operators have the context Operator.
 DEFAULT_CONTEXT = "*"
 
-#: A line of a .po file with a text. Without a keyword, the text continues that of the line above.
+#: A line of a .po file with a text. Without a keyword, it continues the text of the line above.
 LINE = re.compile(r'(?:(msgctxt|msgid|msgstr)\s+)?"((?:[^"\\]|\\.)*)"')
 
 #: Characters that are escaped in .po files, by the letter after the backslash. Others stand for themselves.

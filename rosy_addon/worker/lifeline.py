@@ -139,7 +139,7 @@ class Lifeline(AbstractContextManager["Lifeline"]):
         `item` is the ID of a process to kill, or the path of a folder to remove.
         """
         connection = self._guard[1]
-        with suppress(OSError):  # without a guard process, the block's end still does so
+        with suppress(OSError):  # without a guard process, only `__exit__` cleans up
             connection.send(item)
 
 
@@ -153,5 +153,5 @@ def _remove_abandoned_folders(parent: Path) -> None:
                         remove_folder(str(folder))
 
 
-#: The lifeline of the helper processes of this process, and the folder for as long as it runs.
+#: The lifeline of the helper processes, and of a temporary folder that exists as long as this process.
 PROCESS_LIFELINE = Lifeline()

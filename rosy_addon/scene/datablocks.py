@@ -49,8 +49,8 @@ def _is_from_library(modifier: bpy.types.Modifier) -> bool:
 def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Return the modifiers that RoSy added or changed in this file, and not in a library.
 
-    A modifier that a library override has from its library is changed if its node group is one of this file:
-    then it shows a picture of this file.
+    On a library override, a modifier from the library counts as changed if its node group is in this file, so that
+    it shows a picture of this file.
     """
     if obj.library is not None:
         return []

@@ -1,4 +1,4 @@
-"""Start processes that run modules of this package, with a connection to each. It ends when that closes."""
+"""Start processes that run modules of this package. A process ends when the connection to it closes."""
 
 import os
 import signal

@@ -204,7 +204,7 @@ def _rows(data: bytes, is_text: bool, is_old: bool) -> Iterator[tuple[int, np.nd
 
 
 def _rows_2(data: bytes, is_text: bool) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield blocks of elements as `_rows`, from the format 2.2.
+    """Yield the same blocks of elements as `_rows`, from the format 2.2.
 
     A row has the tag of the element, in text also its type and a number n, then n numbers for groups, then
     the tags of the nodes.

@@ -89,8 +89,8 @@ def draw_strokes(
     collection : bpy.types.Collection, optional
         The collection to which a new object is added. By default the collection of the scene.
     style : StrokeStyle, optional
-        How strokes are placed. By default the settings of the scene, and those of its look if
-        ``scene.rosy.strokes.from_look`` is on; see `strokes_of_look`.
+        How strokes are placed. By default ``scene.rosy.strokes`` sets this. If its property `from_look` is on,
+        the look of the scene replaces some of these settings; see `strokes_of_look`.
     pen : Pen, optional
         Width and colors of strokes. By default as for `style`.
     adjust : callable, optional

@@ -66,7 +66,7 @@ EDITABLE_FIELD = (*EDITABLE, ACTIVE_FIELD)
 
 
 class RosyOperator:
-    """Mixin of all operators: names them, checks their conditions, and reports errors as sentences.
+    """Mixin of all operators. It sets their names, checks their conditions, and reports errors as sentences.
 
     The class ``ROSY_OT_bake`` is the operator ``bpy.ops.rosy.bake``.
     """
@@ -127,9 +127,9 @@ class RosyOperator:
         return {"CANCELLED"}
 
     def call(self, operator: Callable[..., set[str]], **settings: object) -> set[str]:
-        """Call another operator, as its button does, and report its errors.
+        """Call another operator, as a click on its button does, and report its errors.
 
-        Return the result of this operator.
+        Return the result of this operator, which is cancelled if the other one is.
         """
         try:
             result = operator("INVOKE_DEFAULT", **settings)
@@ -141,9 +141,9 @@ class RosyOperator:
     def ask_to_confirm(
         self, context: Context, event: Event, question: str, message: str, verb: str
     ) -> set[str]:
-        """Ask for a confirmation, and return the result of the operator until it is given.
+        """Open a dialog that asks for a confirmation. Return the result of the operator while it is open.
 
-        `verb` is the label of the button that confirms.
+        `question` is the title of the dialog, and `verb` is the label of the button that confirms.
         """
         texts = {"title": question, "message": message, "confirm_text": verb}
         return context.window_manager.invoke_confirm(self, event, icon="WARNING", **texts)
@@ -179,7 +179,7 @@ class RosyOperator:
         name : str, optional
             Name of the attribute. By default the existing field of each mesh is replaced.
         targets : dict of bpy.types.Mesh to list of bpy.types.Object, optional
-            The objects of new fields; see `field_targets`.
+            For each mesh, the objects whose fields it will hold; see `field_targets`.
 
         Raises
         ------

@@ -126,7 +126,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
             return (yield from self._generate(context, targets))
 
     def _generate(self, context: Context, targets: FieldTargets) -> Steps[str]:
-        """Generate fields on meshes, and let their objects have them. The result is a message to the user."""
+        """Generate and store a field on each mesh in `targets`. The result is a message to the user."""
         inputs, errors = [], []
         for mesh, (owner, *_) in targets.items():
             surface = mesh_surface(mesh, f"object '{owner.name}'")
@@ -171,7 +171,7 @@ class ROSY_OT_field_generate(ModalJobMixin, Operator):
     ) -> GeneratorSettings:
         """Return the settings of the generator for a mesh. They contain the guides, read from the scene.
 
-        The mesh is the one of the object `owner`, or its field mesh.
+        `mesh` is the data of the object `owner`, or its field mesh. `surface` is the surface of `mesh`.
         """
         kind_guides = {"features": {"EDGES"}, "uv": {"UV"}, "guided": self.guides}
         guide_kinds = kind_guides.get(self.kind, ())

@@ -1,6 +1,6 @@
 """RoSy: draw N-way rotational symmetry fields on meshes, as LIC pictures and hatching.
 
-A room imports only from the rooms above it::
+A subpackage imports only from the subpackages above it::
 
     core                  errors, progress, settings, files, memory, color
     image_io              PNG and GIF files
@@ -73,7 +73,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Load the public names when one of them is used."""
+    """Return a public name. When the first one is used, load all of them from `api`."""
     if name not in __all__:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     from . import api

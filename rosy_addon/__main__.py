@@ -6,7 +6,7 @@ import sys
 
 
 def _stop_at_once(*_: object) -> None:
-    """End the process: a Ctrl-C while modules are imported, or while Python ends. No file is open."""
+    """Handle Ctrl-C while modules are imported or Python ends: end the process at once. No file is open then."""
     os.write(2, b"rosy: stopped\n")
     os._exit(130)
 

@@ -76,9 +76,9 @@ class Comparison:
 
         Keys are title, degree, energy (see `Field.energy`), and numbers of singularities: singularities
         (all), positive and negative. Fields with a difference from the first one have more keys. These are
-        mean, rms, p95, max, worst_face, worst_position (the center of that face) and compared; see
-        `Difference`. Then matched is the number of singularities that match, and matched_distance is their
-        mean distance in units of the mesh (None if no singularities match).
+        mean, rms, p95, max, worst_face, worst_position (the center of that face) and compared (see
+        `Difference`), matched (the number of pairs of singularities that match), and matched_distance (the
+        mean distance of a pair in units of the mesh; None if there is no pair).
         """
         return [self._row(title, field) for title, field in self.fields.items()]
 

@@ -131,8 +131,8 @@ def strokes(
     orthographic : bool
         Orthographic projection instead of perspective.
     preset : str or path-like, optional
-        A preset of a look, or a file. The strokes then have its spacing, widths, light, outline, ends, colors
-        and marks, as far as they are not given.
+        Name of a preset of the look, or a ``.json`` file. It sets the spacing, widths, light, outline, ends,
+        colors and marks of the strokes, except those that other arguments set.
     width : float, optional
         Full width of a stroke in pixels; by default 1.2.
     colors : sequence of str, optional

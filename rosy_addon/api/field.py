@@ -58,8 +58,8 @@ def from_vectors(
         Raise an error if a vector is not finite, or treat it as undefined.
     off_surface : {"error", "project", "undefined"}
         What to do about vectors that are more than 5 degrees (at vertices, 20) off the surface: raise an
-        error if they are more than 1 percent, always rotate them into the surface, or treat them as
-        undefined.
+        error if more than 1 percent of the vectors are, always rotate them into the surface, or treat them
+        as undefined.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def from_directions(
     surface : Surface
     directions : (F, N, 3) or (V, N, 3) array_like
         The N directions of a face or vertex may be in any order. If one of them is zero, the field is
-        undefined there. Two directions may also be one for each line of a cross.
+        undefined there. For a cross, two directions are enough: one along each of its two lines.
     degree : int, optional
         N. By default the number of directions; two directions that are nowhere opposite are a cross, of
         degree 4, and a `RosyWarning` says so.
@@ -278,15 +278,15 @@ def from_array(
     name : str, optional
         Name of the array; not needed for files that `Field.save` wrote. If the vertices and the faces both
         have an array NAME, "point:NAME" is the array of the vertices, and "cell:NAME" the array of the faces.
-        By default, the only array that can be a field is used: floating-point numbers that are not normals.
+        By default, the only array that can be a field is used. Integers and normals cannot be a field.
     degree : int, optional
         N, from 1 to 12; by default 1 for an array of vectors. Tensors have degree 4.
     nonfinite : {"error", "zero"}
         Raise an error if a number is not finite, or treat the vector or tensor as undefined.
     off_surface : {"error", "project", "undefined"}
-        What to do about vectors off the surface: with "error", replace arrays of 3 components by their
-        tangential components; always rotate vectors into the surface; or treat them as undefined. See
-        `from_vectors`.
+        What to do about vectors off the surface, as in `from_vectors`. But if a row has one vector, "error"
+        raises no error: if too many vectors are off the surface, all of them are replaced by their tangential
+        components, and a `RosyWarning` says so.
 
     Raises
     ------
@@ -321,7 +321,7 @@ def read_field(
     path : path-like, or sequence of path-like
         ``.rosy``, ``.rawfield``, ``.obj`` (of fieldgen), ``.txt``, ``.vec``, ``.csv``, ``.npy``, ``.npz``,
         ``.dmat``, ``.crossfield``, ``.ffield``, ``.vfield`` or ``.om``. Several files with one vector per row
-        are the directions of one field, such as the two of a cross.
+        are the directions of one field, for example the two directions of a cross.
     surface : Surface
     degree : int, optional
         The required degree. By default, any degree is accepted. A file that states no degree has degree 4.

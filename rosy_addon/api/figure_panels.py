@@ -1,4 +1,4 @@
-"""`Studio`: draws the panels of a figure, all from the same camera."""
+"""`Studio`: draws the panels of a figure (pictures of fields and of differences), all from the same camera."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -33,7 +33,7 @@ DIFFERENCE_COLORS, DIFFERENCE_ENDS = "magma", (1.0, 0.25)
 
 @dataclass(frozen=True, eq=False)
 class Studio:
-    """The panels of a figure, which its methods draw. All fields are seen from the same camera.
+    """Draws the panels of a figure, which show fields or differences between them, from one camera.
 
     Attributes
     ----------

@@ -207,8 +207,8 @@ def _comparison_of(fields: _Fields, parts: Sequence[str], reach: float) -> Compa
 def save_figures(path: str | os.PathLike[str], figures: Figure | Sequence[Figure]) -> None:
     """Write figures to a file, with embedded fonts and text as text.
 
-    A `RosyWarning` names letters that the font of matplotlib lacks. Other signs are drawn for them in a ``.pdf``
-    or ``.png``, and in formulas. In other texts of an ``.svg``, the program that shows it has more fonts.
+    A `RosyWarning` names letters that the font of matplotlib lacks. A ``.pdf`` or ``.png`` has placeholders for
+    them. In an ``.svg``, only formulas have placeholders: the viewer draws other texts with its own fonts.
 
     Parameters
     ----------

@@ -158,7 +158,7 @@ class _Survey(NamedTuple):
 
 @dataclass(eq=False)
 class Film:
-    """The views of the fields of a series, from one camera whose frame contains all of them.
+    """The pictures of a film, as inputs of the renderer. They have one camera, whose frame contains all meshes.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ class Film:
 
     @property
     def picture_count(self) -> int:
-        """Number of views. It may depend on how fast the fields turn, which needs a pass over all fields."""
+        """Number of pictures. It may depend on how fast the fields turn, which needs a pass over all fields."""
         intervals = len(self.fields) - (not self.loop)
         return intervals * (self._between + 1) + (not self.loop)
 
@@ -220,7 +220,7 @@ class Film:
 
     @property
     def advice(self) -> str:
-        """A warning that streaks flicker, as too few pictures are between two fields; empty if not."""
+        """A warning if streaks flicker because there are too few pictures between two fields; else empty."""
         turn, between = self._survey.turn, self._between
         needed = _steady_between(turn, self.look)
         if needed <= between:
@@ -232,7 +232,7 @@ class Film:
         )
 
     def views(self) -> Iterator[ViewInput]:
-        """Yield the views.
+        """Yield the renderer's input for each picture.
 
         Raises
         ------

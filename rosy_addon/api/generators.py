@@ -207,9 +207,9 @@ def guided(
 
 
 def _edge_ends(surface: Surface, edges: Any) -> np.ndarray | None:
-    """Return `edges` as (E, 2) vertices at the ends of edges, or None if it is None.
+    """Return the argument `edges` of `guided` as (E, 2) vertices at the ends of edges, or None if it is None.
 
-    It holds such pairs, or it is the path of a file of edges, which is read.
+    `edges` holds such pairs, or it is the path of a file of edges, which is read.
     """
     if isinstance(edges, (str, os.PathLike)):
         return read_edges(edges, surface)
@@ -314,7 +314,8 @@ def _whole_indices(
     Raises
     ------
     RosyError
-        If a vertex or an index is not such a number, or has more than 31 bits.
+        If a vertex is not an integer, an index is not a multiple of 1 / `degree`, or one of them has more
+        than 31 bits.
     """
     rows: list[tuple[int, int]] = []
     for vertex, index in singularities.items():

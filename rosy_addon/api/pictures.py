@@ -346,7 +346,7 @@ def upright_instance(
 
     By default, the field is one of degree 4 along the form of the surface. `color_values` are values for the
     color map at faces, vertices or corners. `tone_values` are tones at vertices or corners, and `tone_image`
-    is an image of tones for the UV map. Either may be given. All are in the forms that `render` accepts.
+    is an image of tones for the UV map, used if there are no `tone_values`. All have the forms of `render`.
     """
     tone = _surface_tone(surface, tone_values, tone_image)
     numbers = corner_numbers(surface, color_values)

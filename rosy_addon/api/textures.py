@@ -80,7 +80,7 @@ class Texture:
         ----------
         path : path-like
             ``<UDIM>`` in the name of the file stands for the number of the tile, as in Blender. All tiles are
-            written, or none. A tile replaces a link of its name, and not the target of the link.
+            written, or none. If the path of a tile is a symbolic link, the link is replaced, not its target.
 
         Raises
         ------

@@ -230,8 +230,8 @@ def run_compare(options: Options) -> None:
 def _no_matplotlibrc() -> Iterator[None]:
     """Context manager: matplotlib finds no ``matplotlibrc`` if it is imported in the block.
 
-    It would read the one of the current folder, which may be from a stranger, and which may be no text or a
-    pipe. Figures do not use its settings. Messages of matplotlib, such as one about its cache, are dropped.
+    matplotlib would read a ``matplotlibrc`` in the current folder, which may be an untrusted file, a binary file
+    or a pipe. Figures do not use its settings. Log messages of matplotlib below errors are dropped.
     """
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     previous = os.environ.get("MATPLOTLIBRC")

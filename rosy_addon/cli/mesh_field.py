@@ -148,7 +148,7 @@ def read_field(
 
 
 def _kinds_with(setting: str) -> list[str]:
-    """Return the kinds of generated fields that have a setting of `GeneratorSettings`."""
+    """Return the kinds of fields whose generator uses a setting of `GeneratorSettings`, given its name."""
     return [kind for kind in GENERATORS if setting in options_of(kind)]
 
 

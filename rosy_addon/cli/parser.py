@@ -104,7 +104,7 @@ def main(
         print_error(str(error))
         discard_output()
         return EXIT_OUTPUT_ERROR
-    except OSError as error:  # of a file or folder that no function has named in a `RosyError`
+    except OSError as error:  # an error that no function has converted to a `RosyError`
         where = "" if error.filename is None else f"{error.filename}: "
         print_error(f"{where}{os_error_text(error)}")
         return EXIT_USER_ERROR
@@ -116,7 +116,7 @@ def main(
 def main_in_extension(argv: Sequence[str]) -> int:
     """Run a command of Blender's own command line, and return its exit status.
 
-    Blender without a window ignores Ctrl-C, so that a command would go on.
+    It restores Python's handling of Ctrl-C, which Blender ignores if it has no window.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)
     return main(argv)

@@ -19,9 +19,9 @@ class OutputError(Exception):
 
 @contextmanager
 def writing_output() -> Iterator[None]:
-    """Context manager: raise errors of the operating system in its block, which writes output, as `OutputError`.
+    """Context manager for a block that writes output: raise its `OSError` as an `OutputError`.
 
-    The error that the reader of the output has ended (`BrokenPipeError`) is not changed.
+    A `BrokenPipeError` (the reader of the output has ended) is not changed.
     """
     try:
         yield

@@ -50,7 +50,7 @@ def add_strokes_command(subparsers: Any) -> None:
         text = "frames of a .blend file, each in its own file; # in OUT stands for the frame number"
         parser.add_value("--frames", "A-B[:STEP]", text)
     parser.add_set_option(StrokeStyle, "one setting of the strokes")
-    # Options of the pen that are not given are no attributes of `Options`.
+    # If an option of the pen is not given, `Options` has no attribute for it.
     add = partial(parser.add_value, default=argparse.SUPPRESS)
     add("--width", "PX", f"width of the strokes ({Pen.width:g})", float_between(0.01, 1e3))
     with parser.only_for(PICTURES):
@@ -130,7 +130,7 @@ def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
     def adjust(style: StrokeStyle, pen: Pen) -> tuple[StrokeStyle, Pen]:
         return style.with_settings(options.requested_settings()), pen_of(options, pen)
 
-    # Names with the number of a frame are not those that the user has given, so links are not followed.
+    # The user has not given the names of the files of frames, so links with these names are not followed.
     output = {"kind": "FILE", "path": path.absolute(), "follow_links": path == options.output}
     output |= {"size": options.size}
     result = draw_strokes(scene, objects=objects, camera=camera, adjust=adjust, **output)

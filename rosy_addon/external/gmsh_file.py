@@ -1,6 +1,7 @@
 """Read `.msh` files of Gmsh in the formats 4.1, 4.0 and 2.2, whose data refer to nodes and elements by their tags.
 
-meshio assumes that data are complete and in the order of the file, and refuses nodes with parameters.
+meshio is not used for these files: it assumes that data are complete and in the order of the file, and it rejects
+nodes with parametric coordinates.
 """
 
 from collections.abc import Iterator
@@ -164,9 +165,10 @@ def _nodes_2(data: bytes, is_text: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _parametric_nodes_2(data: bytes, is_text: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return the result of `_nodes_2`, from rows that also have the dimension and the tag of a part, and parameters.
+    """Return the tags and the (n, 3) positions of nodes with parametric coordinates, from the format 2.2.
 
-    Points and volumes have no parameters, curves have one and surfaces two.
+    A row also has the dimension and the tag of the geometric entity of the node (`part`), and the parametric
+    coordinates on it: none for points and volumes, one for curves and two for surfaces.
     """
     left, data = _counted(data)
     if is_text:
@@ -202,7 +204,7 @@ def _rows(data: bytes, is_text: bool, is_old: bool) -> Iterator[tuple[int, np.nd
 
 
 def _rows_2(data: bytes, is_text: bool) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield blocks of elements as `_rows`, from the format 2.2.
+    """Yield the same blocks of elements as `_rows`, from the format 2.2.
 
     A row has the tag of the element, in text also its type and a number n, then n numbers for groups, then
     the tags of the nodes.
@@ -250,7 +252,7 @@ def _node_count(kind: int) -> int:
 def _elements(
     blocks: Iterator[tuple[int, np.ndarray]],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the tags of faces and volumes, the numbers of their corners, VTK's types, and the tags of nodes.
+    """Return the tags, corner counts and VTK types of faces and volumes, and the tags of the nodes at corners.
 
     Each block has elements of one type: the number of the type, and rows with the tag of an element and the
     tags of its nodes. The first three results have a value for each face or volume. The fourth one has the

@@ -137,8 +137,8 @@ def own_settings() -> Iterator[None]:
 def _warn_of_missing_letters(figure: Figure, only_formulas: bool) -> None:
     """Warn of the letters in a figure for which its fonts have no glyph.
 
-    In an .svg, matplotlib chooses the glyphs of texts with formulas alone (`only_formulas`). All other texts are
-    shown with the fonts of its viewer.
+    `only_formulas` says whether only texts with formulas are checked, as for an .svg. The viewer of an .svg draws
+    all other texts with its own fonts.
     """
     letters_by_families: dict[tuple[str, ...], set[str]] = {}
     for text in figure.findobj(Text):

@@ -39,10 +39,10 @@ HELPER = Helper()
 def read_in_helper(
     paths: Sequence[Path], function: Callable[..., _Result], *arguments: Any
 ) -> _Result:
-    """Return the result of a function that reads files. The helper process calls it.
+    """Let the helper process call a function that reads files, and return its result.
 
-    It may take the memory that is free (on Linux), and a time that follows from the size of the files. If no
-    process can be started, this process calls it, without limits.
+    The function may use all free memory (on Linux), and has a time limit that depends on the size of the files.
+    If no helper process can be started, this process calls the function, without limits.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def read_in_helper(
     Raises
     ------
     RosyError
-        If the function raises it, if a file cannot be read, if it names a pipe or a device, or if the process
-        ends or reaches a limit.
+        If the function raises it, if a file cannot be read or refers to a pipe or a device, or if the helper
+        process ends or reaches a limit.
     """
     free = available_memory()
     seconds = READ_SECONDS + SECONDS_PER_MEGABYTE * 1e-6 * _size_with_named_files(paths)
@@ -97,12 +97,12 @@ def _call_with_limit(
 
 
 def _size_with_named_files(paths: Sequence[Path]) -> int:
-    """Return the size of files in bytes, with the files that they name, and those that these name in turn.
+    """Return the total size in bytes of files and of all files that they refer to, directly or indirectly.
 
     Raises
     ------
     RosyError
-        If one of `paths` cannot be read, or one that is named is a pipe or a device.
+        If one of the files cannot be read, or is a pipe or a device.
     """
     size, waiting, found = 0, list(paths), set(paths)
     while waiting:

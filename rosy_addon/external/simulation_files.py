@@ -129,8 +129,8 @@ def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> Me
     If a file has surface cells, the mesh consists of these. Otherwise the mesh is the boundary of the
     volume cells, and each face has the values of the cell behind it. Cells of second and higher order
     are reduced to their corners. Triangle strips are split into triangles. If a file has several blocks,
-    an array is kept only if all blocks have it. VTK's normals are not read; its texture
-    coordinates are those of the mesh.
+    an array is kept only if all blocks have it. VTK's normals are not read. VTK's texture
+    coordinates become the texture coordinates of the mesh.
 
     Parameters
     ----------

@@ -136,10 +136,10 @@ def _arrays(attributes: Any, index: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _as_matrices(rows: np.ndarray, names: Sequence[str]) -> np.ndarray:
-    """Return rows of the components of symmetric tensors as 3 x 3 matrices, row by row, if their names tell.
+    """Convert rows of named tensor components to 3 x 3 matrices, stored row by row.
 
-    Names of components end in two axes, such as ``XY`` or ``SIXY``, or in two digits, such as ``S12``. Three
-    or four components are a tensor in the plane of x and y; its other elements are 0.
+    The name of a component of a tensor ends in two axes, such as ``XY`` or ``SIXY``, or in two digits, such as
+    ``S12``. Three or four components are a tensor in the plane of x and y; its other elements are 0.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def _as_matrices(rows: np.ndarray, names: Sequence[str]) -> np.ndarray:
     Returns
     -------
     (n, 9) ndarray
-        `rows` itself if the names are not those of the components of a tensor.
+        The matrices. If not all names are names of tensor components, `rows` itself.
     """
     digits = str.maketrans("123", "XYZ")
     pairs = [tuple(re.findall("[XYZ]", name.upper().translate(digits))[-2:]) for name in names]

@@ -45,7 +45,7 @@ SCRIPT = Path(__file__).resolve().with_name("blender_script.py")
 #: .blend files.
 BLENDER_OPTIONS = ("-b", "--factory-startup", "--disable-autoexec", "--python-exit-code", "1")
 
-#: Names of the program of Blender on the PATH. The second one is that of Flatpak.
+#: Names of the program of Blender on the PATH. The second one is used by Flatpak.
 PROGRAM_NAMES = ("blender", "org.blender.Blender")
 
 #: Where installers and users put Blender, by `sys.platform`. ``%...%`` is an environment variable.

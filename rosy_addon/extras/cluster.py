@@ -91,8 +91,8 @@ def _python_runner() -> Callable[[list[str]], tuple[int, str, str]]:
     """Return a function that runs Python with a list of arguments on a worker.
 
     The returned function returns the exit status, the standard output and the standard error as text. It is
-    local to this one. Dask pickles local functions by value, so that the scheduler can unpickle it without
-    RoSy.
+    a local function, because Dask pickles local functions by value: so the scheduler, which may not have RoSy,
+    can unpickle it.
     """
     package = PACKAGE
 

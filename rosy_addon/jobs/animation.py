@@ -224,11 +224,11 @@ def _frame_steps(
     cache: Cache,
     workers: int,
 ) -> Steps[tuple[SceneData, list[_Frame]]]:
-    """Draw one frame from all cameras as part of a job.
+    """Draw the current frame of a scene from all cameras, as part of a job.
 
-    Return what was read, and the frame of each camera. It is the current frame of the scene. If `cameras` is
-    None, it is drawn from the camera that renders it. `cache` has the meshes and fields of earlier frames. The
-    other parameters are as in `bake_animation`.
+    Return the data of the scene, and one `_Frame` for each camera. If `cameras` is None, the only camera is the
+    one that renders the frame. `cache` has the meshes and fields of earlier frames. The other parameters are as
+    in `bake_animation`.
     """
     frame, look = scene.frame_current, read_look(scene.rosy) if look is None else look
     # The look may be animated, and not every device can draw every method, so the device is chosen per frame.
@@ -277,7 +277,10 @@ def _sidecar_text(input_hash: bytes, path: Path) -> bytes:
 
 
 def _own_bytes(path: Path) -> bytes:
-    """Return the contents of a picture or a sidecar file. It is no input (`read_bytes`): it may be replaced."""
+    """Return the contents of a picture or a sidecar file.
+
+    `file_io.read_bytes` would record the file as an input, and RoSy could then not replace it.
+    """
     with file_io.system_errors(path, "cannot be read"):
         return path.read_bytes()
 

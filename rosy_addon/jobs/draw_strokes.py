@@ -89,18 +89,18 @@ def draw_strokes(
     collection : bpy.types.Collection, optional
         The collection to which a new object is added. By default the collection of the scene.
     style : StrokeStyle, optional
-        How strokes are placed. By default the settings of the scene, and those of its look if
-        ``scene.rosy.strokes.from_look`` is on; see `strokes_of_look`.
+        How strokes are placed. By default ``scene.rosy.strokes`` sets this. If its property `from_look` is on,
+        the look of the scene replaces some of these settings; see `strokes_of_look`.
     pen : Pen, optional
         Width and colors of strokes. By default as for `style`.
     adjust : callable, optional
-        Is called with the settings of the scene and its look, and returns those to use.
+        Function that takes the style and the pen that the scene and its look set, and returns the ones to use.
     size : (int, int), optional
         Width and height in pixels of the picture to which lengths in pixels refer. By default the render
         resolution of the scene.
     follow_links : bool
-        Whether the target of a link is replaced, if `path` is one, and not the link itself. Links at the path
-        that is set in the scene are not followed, as somebody else may have made the file.
+        If `path` is a symbolic link, whether its target is replaced instead of the link. A link at the path
+        that is set in the scene is always replaced itself, as the .blend file may be from somebody else.
 
     Returns
     -------

@@ -214,7 +214,7 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
 def write_preset(path: Path, preset: Preset, *, follow_links: bool = False) -> None:
     """Write a preset file with the settings that differ from the default look.
 
-    `follow_links` says whether the target of a link is replaced, and not the link itself.
+    If `path` is a symbolic link, `follow_links` says whether its target is replaced instead of the link.
 
     Raises
     ------

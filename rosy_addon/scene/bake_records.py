@@ -230,7 +230,7 @@ def _all_records() -> list[PropertyGroup]:
 
 
 def recorded_materials(*, textures: bool = True) -> set[Material]:
-    """Return the materials of the pictures that all scenes record. `textures` says whether textures count."""
+    """Return the materials of the recorded pictures of all scenes, and of textures if `textures` is true."""
     records = _all_records()
     return {record.material for record in records if textures or record.view != TEXTURE_VIEW}
 

@@ -218,10 +218,11 @@ def _save_image(image: Image, image_data: ImageData, stem: Path) -> None:
 
 @contextmanager
 def _checking(temporary: Path, path: Path) -> Iterator[None]:
-    """Context manager: check that Blender, in the block, has written a whole .exr to a temporary path of `path`.
+    """Context manager: check that Blender has written a complete .exr file to the path `temporary` in the block.
 
-    Blender does not say why it cannot write a file. `replacing` has checked all else, so the disk is most
-    likely full. If only the end of the file does not fit, Blender does not notice.
+    `path` is the final path, for the error message. Blender does not say why it cannot write a file. `replacing`
+    has ruled out other causes, so the disk is most likely full. If only the end of the file does not fit, Blender
+    raises no error.
     """
     reason = None
     try:

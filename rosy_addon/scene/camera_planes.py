@@ -1,4 +1,4 @@
-"""Planes in front of cameras that only camera rays hit. Backdrops and keys (legends) are such planes."""
+"""Planes that only camera rays hit: backdrops behind all objects, in the color of the paper, and keys (legends)."""
 
 from contextlib import suppress
 
@@ -128,8 +128,8 @@ OVERSIZE = 1.5
 def update_backdrops(scene: Scene) -> None:
     """Replace the backdrops of a scene by the ones that its settings ask for.
 
-    They have the color of `backdrop_color`, and there is one for each of `pictured_cameras`, unless the camera has been
-    made panoramic, or sheared by a parent, after the bake.
+    There is one backdrop for each of `pictured_cameras`. Its color is `backdrop_color`; without one there are none. A camera
+    that was made panoramic after the bake, or sheared by a parent, has none.
     """
     remove_camera_planes(scene, BACKDROP_TAG)
     paper = backdrop_color(scene, read_look(scene.rosy))

@@ -49,8 +49,8 @@ def _is_from_library(modifier: bpy.types.Modifier) -> bool:
 def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Return the modifiers that RoSy added or changed in this file, and not in a library.
 
-    If a library override has RoSy's modifier from its library, this modifier shows a picture of this file by
-    another node group.
+    On a library override, a modifier from the library counts as changed if its node group is in this file, so that
+    it shows a picture of this file.
     """
     if obj.library is not None:
         return []
@@ -62,9 +62,9 @@ def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 
 def remove_picture_modifiers(obj: bpy.types.Object) -> None:
-    """Remove the modifiers of `removable_modifiers`, or give them the node groups of their library again.
+    """Remove the pictures of this file from an object: remove or reset its `removable_modifiers`.
 
-    An ink object is deleted.
+    A modifier that comes from a library gets the node group of the library again. An ink object is deleted.
     """
     if obj.get(INK_TAG):
         bpy.data.batch_remove([obj, obj.data])
@@ -84,10 +84,10 @@ def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 @contextmanager
 def rollback_on_error() -> Iterator[Track]:
-    """Context manager: yield a function that the caller calls with each new datablock, and that returns it.
+    """Context manager: delete the datablocks that its block has created if the block raises an error.
 
-    At the end of the block they are tagged as created by RoSy. If the block raises an error, they are
-    deleted.
+    It yields a function that the block calls with each new datablock. The function returns the datablock. At the
+    end of the block, the datablocks are tagged as created by RoSy.
     """
     created: list[bpy.types.ID] = []
 
@@ -173,7 +173,7 @@ def field_mesh(obj: bpy.types.Object) -> Any:
 
 
 def is_editable(datablock: bpy.types.ID) -> bool:
-    """Return whether a datablock can be changed: it is local, or a library override, but not of a mesh.
+    """Return whether a datablock can be changed: it is local, or a library override of anything but a mesh.
 
     Blender (4.2 to 5.2) ignores values that are written to attributes of a mesh that is an override.
     """

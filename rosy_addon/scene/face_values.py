@@ -68,9 +68,9 @@ def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
 def _face_scalars(
     mesh: bpy.types.Mesh, name: str, users: list[bpy.types.Object], source: str
 ) -> np.ndarray:
-    """Return the result of `read_face_scalars`, read from a mesh with the faces of the field.
+    """Return the result of `read_face_scalars`, given the mesh to read: the original, evaluated or field mesh.
 
-    `users` are the objects that may have a vertex group of this name, and `source` is the name in messages.
+    `users` are the objects that may have a vertex group of this name. `source` names the values in messages.
     """
     attribute = mesh.attributes.get(name)
     if attribute is not None:

@@ -52,7 +52,7 @@ def field_degree(mesh: Mesh) -> int:
 
 
 def direction_names(mesh: Mesh) -> list[str]:
-    """Return those of the names ``dir0``, ``dir1`` ... without a gap that are attributes of a mesh."""
+    """Return the names ``dir0``, ``dir1`` ... of attributes of a mesh, up to the first one that is missing."""
     names = (f"dir{index}" for index in count())
     return list(takewhile(mesh.attributes.keys().__contains__, names))
 

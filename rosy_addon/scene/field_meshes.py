@@ -1,8 +1,8 @@
 """Field meshes: copies of evaluated meshes, which hold the fields of objects whose modifiers change the faces.
 
-Such an object has the property ``obj.rosy.field_mesh``. Its field is made for the faces that are seen, and follows them
-when a modifier or an edit moves them. The vertices of the field mesh are the rest shape. All other objects have their
-fields on their own meshes; see `datablocks.field_mesh`.
+The property ``obj.rosy.field_mesh`` of such an object is its field mesh. The field is made for the faces of the
+evaluated mesh, and rotates with them when a modifier or an edit moves them. The vertices of the field mesh are the rest
+shape. All other objects have their fields on their own meshes; see `datablocks.field_mesh`.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -25,10 +25,11 @@ FieldTargets = dict[Mesh, list[Object]]
 
 @contextmanager
 def field_targets(objects: Sequence[Object], depsgraph: Depsgraph) -> Iterator[FieldTargets]:
-    """Context manager: yield the meshes on which new fields of objects are made.
+    """Context manager: yield the meshes on which new fields of objects are made, each with its objects.
 
-    They are the meshes of the objects or, if modifiers change the faces, their field meshes with the positions that are seen
-    now, or new copies of the evaluated meshes. Copies that `hold_fields` has not given to objects are deleted at the end.
+    The mesh of an object is its own mesh, unless modifiers change the faces. Then it is the field mesh of the object,
+    with vertices moved to their evaluated positions; if there is none with these faces, it is a new copy of the
+    evaluated mesh. Copies that `hold_fields` has not assigned to objects are deleted at the end.
     """
     targets: FieldTargets = {}
     try:
@@ -70,7 +71,10 @@ def _have_same_faces(mesh: Mesh, other: Mesh) -> bool:
 
 
 def hold_fields(targets: FieldTargets) -> None:
-    """Let the meshes of `field_targets`, on which fields have been stored, hold the fields of their objects."""
+    """Assign the meshes of `field_targets`, after fields have been stored on them, to their objects.
+
+    A mesh that is not the object's own becomes its field mesh. Earlier field meshes without users are deleted.
+    """
     for mesh, objects in targets.items():
         for obj in objects:
             earlier = obj.rosy.field_mesh
@@ -81,7 +85,7 @@ def hold_fields(targets: FieldTargets) -> None:
 
 
 def _discard(meshes: Iterable[Mesh]) -> None:
-    """Delete the field meshes among meshes that nothing uses."""
+    """Delete the given meshes that are field meshes and have no users."""
     for mesh in meshes:
         with suppress(ReferenceError):  # deleted
             if mesh.get(_TAG) and not mesh.users:

@@ -1,7 +1,7 @@
-"""Ink objects: children of objects that show a picture over the own materials of the objects.
+"""Ink objects: child objects that show a picture over the materials of their parents.
 
-An ink object has the evaluated geometry of its parent, slightly above the surface, and the material of the picture, which is
-transparent between the lines. So its parent stays as it is, and what the user changes there is seen at once.
+Geometry nodes give an ink object the evaluated geometry of its parent, slightly above the surface. Its material shows
+the picture, and is transparent between the lines. So the parent is not changed, and the ink object follows its edits.
 """
 
 import bpy

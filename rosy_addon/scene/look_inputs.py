@@ -1,8 +1,8 @@
 """Read the inputs of a look other than fields: tones, values for the color map, and reference renders.
 
 A `ReadRequest` says which of them a look needs from the meshes. Tones are read from mesh attributes or from
-images that are mapped to meshes, values for the color map from mesh attributes, and reference renders from
-files.
+images that are mapped to meshes, values for the color map from mesh attributes, and reference renders (renders
+of the scene whose luminance is used as the tone) from files.
 """
 
 import re

@@ -24,7 +24,8 @@ def read_look(settings: Any) -> Look:
     Parameters
     ----------
     settings : PropertyGroup
-        ``scene.rosy``, or ``scene.rosy.look``. The paper is clear in ``scene.rosy`` if ink is drawn over materials.
+        ``scene.rosy``, or ``scene.rosy.look``. If it is ``scene.rosy`` and its property `over_material` is set, the
+        paper of hatching is made transparent.
     """
     look = Look(**read_settings(getattr(settings, "look", settings), Look))
     if getattr(settings, "over_material", False) and is_hatched(look):
@@ -33,10 +34,10 @@ def read_look(settings: Any) -> Look:
 
 
 def object_looks(scene: bpy.types.Scene, objects: Sequence[Object], look: Look) -> list[Look]:
-    """Return the look of each object: that of its own preset, of a collection that it is in, or `look`.
+    """Return the look of each object: from the object's preset, from the preset of a collection, or `look`.
 
-    The innermost collection with a preset counts. The light, the tone and the paper of the scene are one for all: they
-    are those of `look`.
+    Of the collections that contain the object, the innermost one with a preset counts. All looks have the light, the
+    tone, the paper and the unit of `look`, the look of the scene.
 
     Raises
     ------
@@ -61,7 +62,10 @@ def own_presets(scene: bpy.types.Scene, objects: Sequence[Object]) -> list[str]:
 
 
 def _collect_presets(collection: Collection, preset: str, found: dict[Object, str]) -> None:
-    """Add the preset of each object in a collection, whose parent has `preset`. Inner collections come last."""
+    """Add to `found` the preset of each object in a collection and its children, given the parent's preset.
+
+    Inner collections are visited last, so that their presets replace the presets of outer ones.
+    """
     preset = collection.rosy.preset or preset
     if preset:
         found |= dict.fromkeys(collection.objects, preset)
@@ -75,7 +79,7 @@ def _in_light_of(look: Look, scene_look: Look) -> Look:
     Raises
     ------
     RosyError
-        If it shows color values, but the look of the scene shows none, so that they have no source.
+        If `look` colors lines by values, but the look of the scene does not, so that no values are read.
     """
     if colors_values(look) and not colors_values(scene_look):
         raise RosyError("its colors show values: let the look of the scene show them, too")

@@ -198,14 +198,14 @@ def _field_from_corners(
 
 
 def vector_names(mesh: Mesh) -> list[str]:
-    """Return the names of the vector attributes of a mesh that users see, without positions."""
+    """Return the names of the vector attributes of a mesh, except positions and hidden attributes."""
     names = [each.name for each in mesh.attributes if each.data_type == VECTOR_TYPE]
     positions = ("position", "rest_position")
     return [name for name in names if name not in positions and not name.startswith(".")]
 
 
 def _attribute_hint(mesh: Mesh) -> str:
-    """Return advice for a message: which vector attribute to choose, or to make a field if there are none."""
+    """Return advice for a message: choose one of the mesh's vector attributes; if there is none, make a field."""
     names = [f"'{name}'" for name in vector_names(mesh)]
     return f": choose {' or '.join(names)}" if names else ": make or import a field"
 

@@ -233,9 +233,9 @@ def evaluated_mesh(obj: Object) -> Iterator[Mesh | None]:
 
 
 def is_shaded_flat(mesh: Mesh) -> bool:
-    """Return whether the first face of a mesh of more than `FEW_FACES` is shaded flat.
+    """Return whether a mesh has more than `FEW_FACES` faces, and its first face is shaded flat.
 
-    Only one value is read, so that panels can ask at each redraw.
+    Only one value is read, so that panels can call this at each redraw.
     """
     sharp = mesh.attributes.get("sharp_face")
     is_sharp = sharp is not None and sharp.domain == "FACE" and sharp.data_type == "BOOLEAN"

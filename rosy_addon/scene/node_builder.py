@@ -103,7 +103,7 @@ def enabled_output(node: Node) -> NodeSocket:
 
 
 def _operator(operation: str) -> Callable[[Number, Number | float], Number]:
-    """Return the method of a number that combines it with another one by a math node."""
+    """Return a method of `Number` that adds a math node with the number and another one as its inputs."""
     return lambda number, other: number._math(operation, number, other)
 
 

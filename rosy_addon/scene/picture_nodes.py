@@ -59,7 +59,7 @@ class OutputSettings:
         Whether pictures of hatching store its thresholds, from which the material draws hatching in the light
         of the scene. Such pictures are drawn on the CPU.
     over_material : bool
-        Whether pictures with clear paper are shown over the own materials of objects, by ink objects.
+        Whether pictures with transparent paper are shown over the materials of objects, by ink objects.
     """
 
     window_coordinates: bool = False
@@ -146,7 +146,7 @@ def new_material(
             shader = build.mix_shaders(coverage, transparent, shader)
     build("ShaderNodeOutputMaterial", {"Surface": shader})
     if has_clear_paper(look) and hasattr(material, "cycles"):
-        # Ink is no lamp: to sample it makes the rest noisier.
+        # Ink is not a light source. If Cycles samples it as one, renders are noisier.
         material.cycles.emission_sampling = "NONE"
     return material
 
@@ -179,8 +179,8 @@ def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> Node:
 def new_group(obj: Object, material: Material, matrix: np.ndarray | None) -> NodeTree:
     """Create a geometry node group that sets a material and the attribute `CLIP_ATTRIBUTE`.
 
-    It is the node group of RoSy's modifier (`set_picture_modifier`, which names it). The mesh, its material slots and other
-    modifiers stay unchanged.
+    `set_picture_modifier` names the group, and sets it as the group of RoSy's modifier. The mesh, its material slots
+    and other modifiers are not changed.
 
     Parameters
     ----------

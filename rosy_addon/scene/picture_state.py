@@ -229,7 +229,7 @@ class SceneState:
 
 
 def _own_look_digests(scene: Scene, objects: Sequence[Object], look: Look) -> dict[str, str]:
-    """Return digests of the looks of objects that differ from the look of the scene, by names of objects."""
+    """Return, by object name, digests of the looks of those objects whose look is not the look of the scene."""
     try:
         looks = object_looks(scene, objects, look)
     except RosyError as error:

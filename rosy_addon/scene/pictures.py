@@ -336,10 +336,11 @@ def _new_groups(
     *,
     is_over: bool,
 ) -> dict[Object, NodeTree]:
-    """Create the node groups that show a picture, by the objects that get them; see `new_group`.
+    """Create the node groups that show a picture, and return them by object; see `new_group`.
 
-    These are the keys of `matrices`, or their ink objects if the picture is shown over their materials (`is_over`). The
-    values are (4, 4) matrices from object space to clip space, or None. `track` is called with each new datablock.
+    `matrices` has the (4, 4) matrix from object space to clip space, or None, of each object. If `is_over` is true, the
+    picture is shown over the objects' materials: their ink objects get the groups. `track` is called with each new
+    datablock.
     """
     groups = {}
     for obj, matrix in matrices.items():
@@ -366,10 +367,10 @@ def _show_on_objects(node_groups: Mapping[Object, NodeTree], *, keep_textures: b
 
 
 def _remove_from_others(material: Material, objects: Container[Object]) -> None:
-    """Remove a picture from objects that showed an earlier one from the same camera, but are left out of this one.
+    """Remove a picture that was baked again from objects that show the earlier bake, but not the new one.
 
-    They show another picture again or, without one, their own materials. `material` is the one of the picture,
-    and `objects` are the objects that it shows.
+    These objects then show another picture or, if they have none, their own materials. `material` is the material
+    of the picture, which also replaces the material of the earlier bake. `objects` show the new bake.
     """
     pictures = recorded_materials() - {material}
     for obj in list(bpy.data.objects):

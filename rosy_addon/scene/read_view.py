@@ -124,9 +124,9 @@ def scene_depsgraph(scene: Scene) -> Depsgraph:
 def lights_for(
     scene: Scene, depsgraph: Depsgraph, look: Any, instances: Sequence[MeshInstance]
 ) -> tuple[Light, ...]:
-    """Return the lights of a scene in world space, metered on mesh instances; none if a look does not use them.
+    """Return the lights of a scene in world space, scaled by `metered` to the brightness of mesh instances.
 
-    `look` is a `Look` or a `StrokeStyle`. See `metered`.
+    `look` is a `Look` or a `StrokeStyle`. If it does not use the lights of the scene, the result is empty.
     """
     lights = read_lights(depsgraph) if look.light == "scene" else ()
     return metered(lights, instances, scene.rosy.exposure)
@@ -179,10 +179,11 @@ def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
 def read_texture_input(
     scene: Scene, depsgraph: Depsgraph, obj: Object, uv_map: str, color_attribute: str | None
 ) -> tuple[MeshInstance, np.ndarray]:
-    """Read an evaluated object with its field, and the UV map of its texture. Uses the cache of bakes.
+    """Read an evaluated object with its field, and the UV map of its texture.
 
     `uv_map` is the name of the UV map; the active one if it is empty. `color_attribute` is the name of the
-    attribute with the values for the color map; if it is None, no values are read.
+    attribute with the values for the color map; if it is None, no values are read. Surfaces and fields are kept
+    in the cache of bakes.
 
     Returns
     -------

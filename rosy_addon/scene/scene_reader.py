@@ -1,8 +1,8 @@
 """Read a scene as mesh instances: evaluated meshes with their fields, and occluders.
 
 Bakes and live views use the same `SceneReader`. Nothing is changed in the file. The field and the rest positions of an
-object are read from the mesh that holds its field, if that has the faces that are seen. Otherwise the field is read from
-the attributes that modifiers have copied to the evaluated mesh, and a note says so.
+object are read from the mesh that holds its field, if this mesh has the same faces as the evaluated mesh. Otherwise the
+field is read from the attributes that modifiers have copied to the evaluated mesh, and a note says so.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class SceneData:
     objects : list of bpy.types.Object
         The original object of each instance with a field, in the same order.
     warnings : tuple of str
-        One message for each object that was left out because its field cannot be drawn, with the reason, and for each
-        whose field was made for other faces.
+        One message for each object that was left out because its field cannot be drawn, and one for each object whose
+        field was made for other faces than its evaluated mesh has.
     mesh_states : dict
         Digests of the meshes that were read; see the module `mesh_states`.
     """
@@ -215,13 +215,12 @@ class SceneReader:
         Parameters
         ----------
         instances : iterator of (bpy.types.DepsgraphObjectInstance, bool)
-            Instances of meshes, each with whether its field is drawn. The others only hide what is behind
-            them.
+            Instances of meshes, and whether their fields are drawn. If not, they only occlude others.
         request : ReadRequest
             What is read of the meshes besides shapes and fields.
         deadline : float
-            Time in seconds of `time.monotonic`. At least one changed mesh is read. Those that are not read by
-            then are left for the next call; see `is_complete`.
+            Time in seconds of `time.monotonic` after which no further mesh is read, except the first changed
+            one. The remaining meshes are left for the next call; see `is_complete`.
         """
         if self.is_complete:
             self.errors.clear()
@@ -339,10 +338,11 @@ class SceneReader:
     def _copied_field(
         self, mesh: Mesh, owner: Object, surface: Surface, undeformed: Surface | None
     ) -> RosyField:
-        """Return the field of an evaluated mesh, whose attributes modifiers or edit mode have copied.
+        """Return the field in the attributes that modifiers or edit mode have copied to an evaluated mesh.
 
-        `surface` is that of the mesh. `undeformed` has its faces in the shape of the field, or is None: then
-        modifiers have copied the vector of a face to all of its parts, vectors are projected, and a note says so.
+        `surface` is the surface of the mesh. `undeformed` has the same faces in the shape for which the field was
+        made. If modifiers have changed the faces, it is None: each part of a face then has a copy of the vector of
+        the face, projected to the part, and a note says that the field was made for other faces.
         """
         original = owner.data
         name, degree = attribute_name(original), field_degree(original)

@@ -103,9 +103,9 @@ def read_editable_singularities(obj: Object, depsgraph: Depsgraph) -> Singularit
 def mesh_of_own_vertices(obj: Object, evaluated: Mesh | None) -> Mesh:
     """Return the evaluated mesh if its first vertices are the vertices of the original mesh.
 
-    That is assumed if it has at least as many vertices: modifiers such as *Armature*, *Subdivision Surface*
-    and *Mirror* keep the vertices, and add new ones after them. Otherwise, or if there is no evaluated mesh
-    (None), the original mesh is returned.
+    This is assumed if it has at least as many vertices as the original mesh: modifiers such as *Armature*,
+    *Subdivision Surface* and *Mirror* keep the vertices, and add new ones after them. Otherwise, or if there is
+    no evaluated mesh (None), the original mesh is returned.
     """
     own = field_mesh(obj)
     is_lost = evaluated is None or len(evaluated.vertices) < len(own.vertices)

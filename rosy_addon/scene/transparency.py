@@ -1,4 +1,4 @@
-"""Find the parts of meshes through which one sees what is behind them. They hide nothing in pictures."""
+"""Find the transparent faces of meshes, which do not occlude other meshes in pictures."""
 
 import numpy as np
 from bpy.types import Material, Mesh, Node, NodeTree, Object
@@ -6,7 +6,7 @@ from bpy.types import Material, Mesh, Node, NodeTree, Object
 from ..field.surface import Surface
 from .meshes import material_indices
 
-#: Shader nodes through which one sees what is behind them.
+#: Types of shader nodes that are transparent.
 _TRANSPARENT_NODES = ("BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION")
 
 #: Inputs of *Principled BSDF*, and the values with which it is opaque.
@@ -14,7 +14,7 @@ _OPAQUE_INPUTS = {"Alpha": 1.0, "Transmission Weight": 0.0}
 
 
 def transparent_slots(mesh: Mesh, owner: Object) -> tuple[bool, ...]:
-    """Return for each material slot of an evaluated mesh whether one sees through its material, even in parts only.
+    """Return for each material slot of an evaluated mesh whether its material is transparent, at least in parts.
 
     `owner` is the original object, whose slots can replace the materials of the mesh.
     """
@@ -26,9 +26,9 @@ def transparent_slots(mesh: Mesh, owner: Object) -> tuple[bool, ...]:
 
 
 def opaque_triangles(surface: Surface, mesh: Mesh, owner: Object) -> np.ndarray:
-    """Return the indices of the triangles of an evaluated mesh that hide what is behind them, (T,) int64.
+    """Return the indices of the triangles of an evaluated mesh whose materials are opaque, (n,) int64.
 
-    See `transparent_slots`. `surface` is the surface of the mesh.
+    `surface` is the surface of the mesh, and `owner` its original object; see `transparent_slots`.
     """
     is_transparent = np.array(transparent_slots(mesh, owner) or (False,))
     slot = np.clip(material_indices(mesh), 0, len(is_transparent) - 1)

@@ -39,9 +39,9 @@ def field_objects(view_layer: ViewLayer, names: Iterable[str] | None = None) -> 
 
 
 def drawn_objects(depsgraph: Depsgraph) -> list[Object]:
-    """Return the objects with a field that renders of a view layer show, themselves or as instances.
+    """Return the original objects with a field that are visible in renders of a view layer.
 
-    These are all `field_objects`, and others that only instances of Geometry Nodes show.
+    These are all `field_objects`, and further objects of which only instances by Geometry Nodes are visible.
     """
     objects = field_objects(depsgraph.view_layer)
     visible_objects = set(_visible_objects(depsgraph.view_layer))

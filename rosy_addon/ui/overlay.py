@@ -44,7 +44,7 @@ DRAW_HANDLERS: list[Any] = []
 def show(obj: bpy.types.Object, singularities: Singularities, tool: str = "") -> None:
     """Show the singularities of an object, in place of those shown before.
 
-    With the identifier of a tool, they are shown while it is active.
+    If `tool` is the identifier of a tool, they are shown only while this tool is active.
     """
     _SINGULARITIES[obj.session_uid], _TOOLS[obj.session_uid] = singularities, tool
     add_handlers(_APP_HANDLERS)

@@ -21,7 +21,7 @@ FOLDER = Path(__file__).parent / "locale"
 #: Blender's context of most texts, which .po files leave out. Labels of operators have the context Operator.
 DEFAULT_CONTEXT = "*"
 
-#: A line of a .po file with a text. Without a keyword, the text continues that of the line above.
+#: A line of a .po file with a text. Without a keyword, it continues the text of the line above.
 LINE = re.compile(r'(?:(msgctxt|msgid|msgstr)\s+)?"((?:[^"\\]|\\.)*)"')
 
 #: Characters that are escaped in .po files, by the letter after the backslash. Others stand for themselves.
@@ -42,7 +42,7 @@ def read_translations(path: Path) -> Messages:
     Raises
     ------
     RosyError
-        If the file cannot be read, or a line is not that of a .po file without plurals.
+        If the file cannot be read, or a line does not belong in a .po file. Plurals are not supported.
     """
     try:
         lines = read_bytes(path).decode("utf-8").splitlines()
@@ -72,7 +72,7 @@ def read_translations(path: Path) -> Messages:
 
 
 def register() -> None:
-    """Give Blender the translations. For a file that cannot be read, say so, and keep the English texts."""
+    """Register the translations with Blender. Print an error for each file that cannot be read, and skip it."""
     languages = {}
     for path in sorted(FOLDER.glob("*.po")):
         try:
@@ -85,5 +85,5 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take the translations from Blender."""
+    """Remove the translations from Blender."""
     bpy.app.translations.unregister(EXTENSION_ID)

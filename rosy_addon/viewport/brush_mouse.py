@@ -85,8 +85,8 @@ _is_held = False
 def current_mouse(context: Context, obj: Object, *, holds: bool = False) -> BrushMouse:
     """Return the `BrushMouse` of an object in the region of the context.
 
-    It is created again after each change of the scene. If `holds`, it is created now, and kept until
-    `release_mouse`, whatever changes.
+    It is kept until the scene changes or another object or region is requested. If `holds` is true, a new one is
+    created, and is kept until `release_mouse`, whatever changes.
     """
     global _current, _is_held
     key = obj.name, context.region.as_pointer()
@@ -98,19 +98,19 @@ def current_mouse(context: Context, obj: Object, *, holds: bool = False) -> Brus
 
 
 def release_mouse(*_: Any) -> None:
-    """Forget the object that was read. Blender also calls this before it loads other data."""
+    """Discard the current `BrushMouse`. Blender also calls this before it loads a file or undoes a step."""
     global _current, _is_held
     _current, _is_held = None, False
 
 
 def unregister() -> None:
-    """Forget the object that was read, and stop watching for changes."""
+    """Discard the current `BrushMouse`, and remove the handlers."""
     release_mouse()
     remove_handlers(_HANDLERS)
 
 
 def _after_change(*_: Any) -> None:
-    """Forget the object that was read, so that it is read again at the next redraw of the cursor."""
+    """Discard the current `BrushMouse` after a change of the scene, unless it is held."""
     if not _is_held:
         release_mouse()
 

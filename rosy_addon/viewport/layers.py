@@ -106,7 +106,7 @@ class LayerStates:
     def forget(self, *_: Any) -> None:
         """Mark everything to be read again, except data that is cached by its contents.
 
-        Blender calls this after an undo. It is also called when another device draws from now on.
+        Blender calls this after an undo. The session calls it when the CPU takes over from the graphics card.
         """
         self._layers = {
             key: LayerState(SceneReader(layer.reader.cache), is_starting=layer.is_starting)

@@ -166,8 +166,8 @@ def look_up_singularities(
 ) -> tuple[np.ndarray, np.ndarray] | Preparation:
     """Look up the singularities of an instance with a field, or return a `Preparation` that finds them.
 
-    They are (K,) vertices and (K,) indices in units of 1 / N, row by row (`field.find_singularities`). All
-    deformations of a mesh have the same singularities.
+    They are (K,) vertices and their (K,) indices in units of 1 / N; see `field.find_singularities`. They are
+    found on the rest shape, so all deformations of a mesh have the same ones.
     """
     surface = instance.surface
     key = "singularities", surface.rest_shape_key, instance.field

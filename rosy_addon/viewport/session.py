@@ -64,7 +64,7 @@ class ViewportSession:
     spaces : set of int
         Pointers of the `SpaceView3D` that are live.
     fallback_reason : str or None
-        Why the CPU draws instead of the graphics card. None if it does not, or if the user chose it.
+        Why the CPU draws instead of the graphics card. None if the card draws, or if the user chose the CPU.
     flow_clock : FlowClock
         Frames by which streaks drift in all views, in addition to the frames of the scene.
 

@@ -6,8 +6,8 @@ helper         controls a helper process, which calls functions for this process
 pool           distributes function calls to several helper processes
 channel        sends messages between processes
 start          starts processes of this package with a connection to them
-guard          is the program of a process that kills others, and removes a folder, when its parent has ended
-lifeline       starts programs, and makes a temporary folder, that end when this process ends
+guard          is the program of a process that kills programs and removes a folder when its parent has ended
+lifeline       starts programs that are killed, and makes a folder that is removed, when this process ends
 program        runs other programs as parts of jobs
 frame_workers  runs a command for many frames in several processes
 """

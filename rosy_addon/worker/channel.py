@@ -181,7 +181,10 @@ class _Pickler(pickle.Pickler):
         return number, type(obj), {field.name: getattr(obj, field.name) for field in fields(obj)}
 
     def _use(self, key: int) -> None:
-        """Record that the message contains the object with an id, and those in its fields, if they were sent."""
+        """Record that the message contains an object that was sent before, and the objects in its fields.
+
+        `key` is the id of the object. Nothing is recorded if the object was not sent before.
+        """
         if key in self._sent:
             self.used[key] = self._sent[key]
             for value in vars(self._sent[key][1]).values():

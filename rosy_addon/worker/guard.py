@@ -49,7 +49,7 @@ def main(handle: str) -> None:
 
 
 def _items_until_the_end(end: Connection) -> list[int | str]:
-    """Return what the parent has sent, when it has ended."""
+    """Wait until the parent ends, and return the items that it has sent (see `main`)."""
     items: list[int | str] = []
     with suppress(OSError):  # the parent has ended already, but what it has sent is still there
         end.send("ready")

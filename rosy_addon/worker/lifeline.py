@@ -60,7 +60,7 @@ class Lifeline(AbstractContextManager["Lifeline"]):
 
     @property
     def folder(self) -> Path:
-        """The temporary folder. It is created when it is first used. Programs use it as theirs.
+        """The temporary folder, created on first access. Programs use it, too (environment variable TMPDIR).
 
         Raises
         ------
@@ -134,9 +134,12 @@ class Lifeline(AbstractContextManager["Lifeline"]):
         self._lock.close()
 
     def _tell_guard(self, item: int | str) -> None:
-        """Let the guard process end a program or remove a folder, given its ID or path, with this process."""
+        """Tell the guard process what to clean up when this process ends.
+
+        `item` is the ID of a process to kill, or the path of a folder to remove.
+        """
         connection = self._guard[1]
-        with suppress(OSError):  # without a guard process, the block's end still does so
+        with suppress(OSError):  # without a guard process, only `__exit__` cleans up
             connection.send(item)
 
 
@@ -150,5 +153,5 @@ def _remove_abandoned_folders(parent: Path) -> None:
                         remove_folder(str(folder))
 
 
-#: The lifeline of the helper processes of this process, and the folder for as long as it runs.
+#: The lifeline of the helper processes, and of a temporary folder that exists as long as this process.
 PROCESS_LIFELINE = Lifeline()

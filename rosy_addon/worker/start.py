@@ -1,4 +1,4 @@
-"""Start processes of this package with a connection to them. They end when it closes."""
+"""Start processes that run modules of this package. A process ends when the connection to it closes."""
 
 import os
 import signal

@@ -233,7 +233,7 @@ def dancers():
         _mannequin((1.25 * (i - 1), 0.25 * (i % 2), 0), pose) for i, pose in enumerate(poses)
     ]
     ground = box(20, 8, 0.1, at=(0, 1.5, -0.05))
-    camera((0.3, -5.6, 1.35), (0.05, 0, 1.0), 58)
+    camera((0.3, -6.6, 1.35), (0.1, 0, 0.98), 56)
     lamp("SUN", (-4, -3, 5), 3, angle=0.02)
     make_fields(*figures, ground)
     bake("cross-hatch")
@@ -251,7 +251,10 @@ def street():
         ],
     )
     openings = [box(0.45, 3, 0.6, at=(x, 0, 1.35)) for x in (-0.5, 0.5)]
-    cut(house, *openings, box(0.5, 3, 1.0, at=(0, 0, 0.4)), box(3, 0.5, 0.6, at=(0, 0, 1.35)))
+    openings += [box(0.5, 3, 1.0, at=(0, 0, 0.4)), box(3, 0.5, 0.6, at=(0, 0, 1.35))]
+    for opening in openings:
+        opening.parent = house
+    cut(house, *openings)
     modify(house, "BEVEL", width=0.03, segments=2, limit_method="ANGLE")
     tree = bpy.data.node_groups.new("Street", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")

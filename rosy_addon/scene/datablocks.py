@@ -114,12 +114,12 @@ def delete_owned(datablock: bpy.types.ID | None) -> int:
 
 
 def delete_unused() -> int:
-    """Delete the node groups, materials and images that RoSy created and that nothing uses.
+    """Delete the meshes, node groups, materials and images that RoSy created and that nothing uses.
 
     Return the number of deleted images.
     """
-    # The order matters: a geometry node group uses a material, which uses an image and a shader node group.
-    for name in ("node_groups", "materials", "node_groups", "images"):
+    # The order matters: a mesh or a geometry node group uses a material, which uses an image and a shader node group.
+    for name in ("meshes", "node_groups", "materials", "node_groups", "images"):
         owned = [block for block in getattr(bpy.data, name) if block.get(OWNED_TAG)]
         unused = [block for block in owned if not block.users and block.library is None]
         bpy.data.batch_remove(unused)

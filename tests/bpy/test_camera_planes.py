@@ -86,6 +86,16 @@ def test_the_switch_shows_and_hides_the_plane(colored, kind, update):
     assert contents() == before
 
 
+@pytest.mark.parametrize("kind", ["key", "backdrop"])
+def test_nothing_is_left_of_a_plane_that_the_user_has_deleted(colored, kind):
+    before = contents()
+    setattr(colored.rosy, kind, True)
+    bake(colored)
+    bpy.data.objects.remove(*planes(kind))
+    remove_bakes(colored)
+    assert contents() == before
+
+
 def test_the_image_of_a_key(keyed):
     bake(keyed)
     image = key_image(*keys())

@@ -285,9 +285,9 @@ class _LineAverages:
             scatter_rows(self._values[line], cells, rows)
 
     def slopes(self, covering: Covering, cells: np.ndarray, line: np.ndarray) -> np.ndarray:
-        """Return the (M, n) float32 derivatives of averages perpendicular to the line, toward its left.
+        """Return (M, n) float32: how the averages of the noise change from a line to its left, per pixel.
 
-        They are per pixel, for the M lines of each of the n cells, and averaged over the channels. `line`,
+        There is a derivative for each of the M lines of each of the n cells, the mean of all channels. `line`,
         (M,), holds the numbers of the lines of a cell in the order of the result.
         """
         slopes = np.empty((len(line), len(cells)), dtype=np.float32)

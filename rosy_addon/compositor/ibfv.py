@@ -303,9 +303,10 @@ class _Sums:
                 total[state] = source.take(sheets.cells[block])
 
     def weighted(self, place: int, values: np.ndarray, steps: int, block: slice) -> np.ndarray:
-        """Multiply the sums that arrive from D steps upstream by their weight, q^D.
+        """Multiply the sums that arrive from D steps upstream by q^D, which `weight` holds for these D.
 
-        Sums of the second source are rotated, too.
+        Source 0 is the constant part of the noise. Source 1, with flow, holds the cosine part and the sine part as complex
+        numbers; its sums are also rotated by the phase over D steps (`_step_turn`).
 
         The arithmetic uses real numbers. Products of complex numbers are not rounded alike on all
         processors.

@@ -106,9 +106,9 @@ class Combing:
         self._set_face_z(self.system.face_representations_at(z, changed), changed)
 
     def settle(self) -> tuple[np.ndarray, np.ndarray]:
-        """Solve the linear system for the whole surface, and return `representations`.
+        """Compute the field on the whole surface from the guides, and return the new `representations`.
 
-        If there are no guides, the field does not change.
+        Without guides, the field does not change.
         """
         if not self.guides.any():
             return self.representations

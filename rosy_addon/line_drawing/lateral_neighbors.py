@@ -283,6 +283,7 @@ def _is_older(samples: StrokeSamples, pairs: _Pairs) -> np.ndarray:
 def _left_component(vectors: np.ndarray, frame: np.ndarray) -> np.ndarray:
     """Return the (n,) components of vectors along the unit vectors to the left of strokes.
 
-    `frame`, (n, 4, 3), has the position, normal and direction of a sample for each of the (n, 3) vectors.
+    `frame`, (n, 4, 3), holds four vectors of a sample for each of the (n, 3) vectors. The second and third are the unit
+    normal and the unit direction of the stroke.
     """
     return dot(vectors, np.cross(frame[:, 1], frame[:, 2]))

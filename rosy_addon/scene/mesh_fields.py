@@ -246,7 +246,7 @@ def assign_fields(fields: dict[Mesh, RosyField], name: str = "", form: str = "VE
 
 
 def _default_name(mesh: Mesh, form: str) -> str:
-    """Return the default name of the attribute in which a field of a mesh is stored in a form."""
+    """Return the default name of the attribute that stores a field, given how it is stored: "VECTOR" or "ANGLE"."""
     if form == "ANGLE":
         return DEFAULT_ANGLE_NAME
     name = attribute_name(mesh)

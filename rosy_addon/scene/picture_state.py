@@ -297,7 +297,7 @@ def read_texture_state(scene: Scene, depsgraph: Depsgraph, obj: Object) -> Pictu
 
 
 def _used_output(settings: PropertyGroup, names: Iterable[str]) -> dict:
-    """Return settings of a scene by name, without the folder if pictures are packed."""
+    """Return a dict of the named settings and their values, without `directory` if pictures are packed into the file."""
     is_packed = settings.store == "PACKED"
     return {name: getattr(settings, name) for name in names if name != "directory" or not is_packed}
 

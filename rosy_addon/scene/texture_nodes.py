@@ -56,7 +56,7 @@ def new_texture_material(
 def color_shader(build: NodeBuilder, image_node: Node, *, is_clear: bool = False) -> NodeSocket:
     """Add a diffuse shader with the colors of an image, and return its output.
 
-    `is_clear` says whether the shader is transparent where the image is.
+    If `is_clear`, the shader is transparent where the image is transparent.
     """
     inputs = {"Base Color": image_node.outputs["Color"], "Roughness": 1.0}
     if is_clear:

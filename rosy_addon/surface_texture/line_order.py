@@ -118,7 +118,9 @@ class CombedDirections:
     sense: LineOrder
 
     def directions_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return (n,) complex unit tangents at points of the tangent mesh, near to directions of the field.
+        """Return (n,) complex unit tangents along the first line direction, at points of the tangent mesh.
+
+        Of both opposite directions along the lines, the one nearer to `sense` is returned.
 
         Parameters
         ----------

@@ -69,7 +69,7 @@ class TextureFrame:
         return [FIRST_TILE + u + TILES_PER_ROW * v for u, v in self.tiles]
 
     def first_row(self, tile: int) -> int:
-        """Return the first row of a tile in the frame. `tile` is an index into `tiles`."""
+        """Return the lowest row of texels of the tile `tiles[tile]`; the frame holds all tiles on top of each other."""
         return self.size * tile if self.is_udim else 0
 
     def flat_indices(self, column: np.ndarray, row: np.ndarray) -> np.ndarray:

@@ -170,7 +170,10 @@ class _Pickler(pickle.Pickler):
         self.used: dict[int, tuple[int, Any]] = {}
 
     def persistent_id(self, obj: Any) -> int | tuple[int, type, dict[str, Any]] | None:
-        """Return what is written for an object of `KEPT_CLASSES`; None for other objects."""
+        """Return what the pickle holds in place of an object of `KEPT_CLASSES`; None for other objects.
+
+        The first time, this is a new number, the class and the attributes; after that, the number alone.
+        """
         if not isinstance(obj, KEPT_CLASSES):
             return None
         self._use(id(obj))

@@ -61,7 +61,7 @@ class RawField:
 
     @property
     def columns(self) -> int:
-        """Count of numbers in each row of the file, such as 3 k."""
+        """Count of numbers in each row of the file, such as 3 N for N vectors."""
         return int(np.prod(self.values.shape[1:]))
 
 

@@ -22,7 +22,7 @@ def as_scipy(matrix):
 def bumpy(surface, amount=0.15, stretch=(1.0, 1.2, 1.5)):
     """A surface without symmetry, so that the smallest eigenvalue is simple."""
     x, y, z = surface.vertices.T
-    out = 1 + amount * np.sin(3 * x + 1) * np.cos(2 * y) + 0.5 * amount * np.sin(4 * z + x)
+    out = 1 + amount * np.sin(3 * x + 1) * np.cos(2 * y + 0.5) + 0.5 * amount * np.sin(4 * z + x)
     return rebuilt(surface, surface.vertices * out[:, None] * stretch)
 
 

@@ -26,7 +26,7 @@ def folded(surface):
 
 
 MESHES = {
-    "triangles": bumpy(rebuilt(icosphere(3), icosphere(3).vertices @ TURN)),
+    "triangles": bumpy(icosphere(3)),
     "quads": bumpy(GLOBE),
     "sheet": rebuilt(plane(9, 7), SHEET + np.outer(np.sin(2 * SHEET[:, 0] + 1), [0, 0, 0.4])),
     "rough": folded(ROUGH),
@@ -103,9 +103,12 @@ def test_a_field_depends_on_the_shape_alone(name, kind, degree):
         assert turned.max() < np.radians(0.1), change
 
 
-@pytest.mark.parametrize("degree", [1, 2, 4])
+@pytest.mark.parametrize("degree", [1, 2])
 def test_numbers_of_mirror_images_do_not_choose(degree):
-    """The multigrid levels of a mirror-symmetric mesh are symmetric, too: no choice between two images is made."""
+    """The multigrid levels of a mirror-symmetric mesh are symmetric, too: no choice between two images is made.
+
+    In these degrees, the field with the least energy is symmetric.
+    """
     surface = symmetric_head(4)
     mesh, back, _ = changed(surface, "renumbered")
     actual = back(generate(mesh, "smoothest", degree).vectors)

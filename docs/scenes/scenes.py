@@ -419,7 +419,7 @@ def machine():
     camera((0.0, -5.6, 4.0), (1.1, -0.1, 0.25), 50)
     lamp("AREA", (-3, -3, 5), 700, size=0.8)
     make_fields(flange, gear, nut, table)
-    bake("white-on-black")
+    bake("pen-and-ink")
 
 
 def hills():

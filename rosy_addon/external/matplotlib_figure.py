@@ -105,21 +105,21 @@ def own_settings() -> Iterator[None]:
 
     A file ``matplotlibrc`` of the user, or of the current folder, may set fonts and sizes, and start LaTeX.
     With the defaults, the same figure has the same bytes everywhere. The settings of the user apply again
-    after the block. What matplotlib reports about letters without a glyph is dropped.
+    after the block. What matplotlib logs about letters without a glyph, and fontTools about old fonts, is dropped.
 
     Raises
     ------
     RosyError
         If a text between dollar signs is not a formula, or a text is smaller than a pixel.
     """
-    log = logging.getLogger("matplotlib")
-    level = log.level
+    levels = {log: log.level for log in map(logging.getLogger, ("matplotlib", "fontTools"))}
     try:
         with matplotlib.rc_context(), warnings.catch_warnings():
             matplotlib.rcdefaults()
             matplotlib.rcParams.update(FILE_SETTINGS)
             warnings.filterwarnings("ignore", "Glyph .* missing")
-            log.setLevel(logging.ERROR)
+            for log in levels:
+                log.setLevel(logging.ERROR)
             yield
     except (ValueError, RuntimeError) as error:
         first_line = str(error).strip().partition("\n")[0]
@@ -131,7 +131,8 @@ def own_settings() -> Iterator[None]:
             raise RosyError(message) from None
         raise
     finally:
-        log.setLevel(level)
+        for log, level in levels.items():
+            log.setLevel(level)
 
 
 def _warn_of_missing_letters(figure: Figure, only_formulas: bool) -> None:

@@ -266,6 +266,13 @@ def test_formulas(fields, tmp_path, error_of):
     rf.save_figures(tmp_path / "a.svg", figure)
 
 
+def test_the_date_of_a_font_is_not_reported(fields, tmp_path, caplog):
+    """A .pdf embeds matplotlib's font for primes, whose date fontTools doubts."""
+    figure = rf.figure(fields, parts=("table",), caption="$x'$", dpi=60)
+    rf.save_figures(tmp_path / "a.pdf", figure)
+    assert not caplog.records
+
+
 def test_what_a_figure_refuses(fields, error_of):
     other = rf.Surface(pv.Icosphere(nsub=1))
     for arguments, message in (

@@ -510,7 +510,7 @@ def knot():
     bpy.ops.object.convert(target="MESH")
     knot = bpy.context.object
     knot.rotation_euler = radians(68), 0, 0
-    camera((0, -10, 1.0), (0, 0, 0), 50)
+    camera((0, -13, 1.0), (0, 0, -0.2), 50)
     lamp("AREA", (-4, -5, 5), 900, size=1.0)
     make_fields(knot, kind="curvature")
     bake("plaid")

@@ -85,6 +85,8 @@ def read_damaged(path, data, garbage, offset, read):
         read(path)
     except RosyError as error:
         assert "\n" not in str(error) and str(path) in str(error)
+    finally:
+        path.unlink()  # a field file is read with the mesh file of its name
 
 
 def assert_damaged(error_of, path, data, expected, read, *arguments):

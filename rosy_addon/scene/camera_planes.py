@@ -20,11 +20,12 @@ from .read_view import scene_depsgraph
 HIDDEN_FROM = ("diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
 
-def pictured_cameras(scene: Scene) -> dict[Object, PropertyGroup]:
-    """Return the cameras from which pictures were baked, each with the record of one of its pictures.
+def pictured_views(scene: Scene) -> list[tuple[Object, Camera, PropertyGroup]]:
+    """Return the cameras from which pictures were baked, each as it is now and with the record of one of its pictures.
 
     If a camera has several pictures, one that objects show is preferred. An animation in which each frame is
-    drawn from the camera that renders it counts as a picture of the active camera.
+    drawn from the camera that renders it counts as a picture of the active camera. A camera that was made panoramic
+    after the bake, or sheared by a parent, is left out.
     """
     shown = {material for obj in scene.objects for material in shown_materials(obj)}
     cameras: dict[Object, PropertyGroup] = {}
@@ -33,7 +34,11 @@ def pictured_cameras(scene: Scene) -> dict[Object, PropertyGroup]:
         is_camera = camera is not None and camera.type == "CAMERA"
         if is_camera and (camera not in cameras or record.material in shown):
             cameras[camera] = record
-    return cameras
+    views = []
+    for camera, record in cameras.items():
+        with suppress(RosyError):
+            views.append((camera, camera_of_object(scene, scene_depsgraph(scene), camera), record))
+    return views
 
 
 def remove_camera_planes(scene: Scene, tag: str) -> None:
@@ -128,21 +133,18 @@ OVERSIZE = 1.5
 def update_backdrops(scene: Scene) -> None:
     """Replace the backdrops of a scene by the ones that its settings ask for.
 
-    There is one backdrop for each of `pictured_cameras`. Its color is `backdrop_color`; without one there are none. A camera
-    that was made panoramic after the bake, or sheared by a parent, has none.
+    There is one backdrop for each of `pictured_views`. Its color is `backdrop_color`; without one there are none.
     """
     remove_camera_planes(scene, BACKDROP_TAG)
     paper = backdrop_color(scene, read_look(scene.rosy))
     if paper is not None:
-        for camera in pictured_cameras(scene):
-            with suppress(RosyError):
-                _add_backdrop(scene, camera, paper)
+        for camera, view, _ in pictured_views(scene):
+            _add_backdrop(scene, camera, view, paper)
 
 
-def _add_backdrop(scene: Scene, camera: Object, paper: np.ndarray) -> None:
-    """Add a plane in a linear RGB color, parented to a camera."""
+def _add_backdrop(scene: Scene, camera: Object, view: Camera, paper: np.ndarray) -> None:
+    """Add a plane in a linear RGB color that fills the view of a camera, parented to it."""
     name = f"RoSy Backdrop {camera.name}"
-    view = camera_of_object(scene, scene_depsgraph(scene), camera)
     corners = frame_corners(view, DISTANCE * camera.data.clip_end, OVERSIZE)
     with rollback_on_error() as track:
         color = (*paper.tolist(), 1.0)

@@ -1,7 +1,6 @@
 """Keys (legends) on a plane in front of a camera: color scale, kinds of singularities, scale bar, caption."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 
@@ -15,17 +14,14 @@ from ..annotation.key_layout import KeyParts, lay_out_key
 from ..annotation.round_numbers import format_number, round_below
 from ..compositor.picture import Picture
 from ..core.color import LUMINANCE_WEIGHTS
-from ..core.errors import RosyError
 from ..projection.camera import Camera
 from ..rendering.picture_images import picture_image
 from . import camera_planes
 from .blender_images import new_image
-from .cameras import camera_of_object
 from .datablocks import KEY_TAG, rollback_on_error
 from .look_properties import backdrop_color, read_look
 from .meshes import read_collection, vertex_positions
 from .node_builder import first_node, new_empty_material
-from .read_view import scene_depsgraph
 
 #: Distance of the plane of a key from the camera, as a multiple of the distance of the near clip plane.
 DISTANCE = 1.02
@@ -56,24 +52,24 @@ def update_camera_planes(scene: Scene) -> None:
 def update_keys(scene: Scene) -> None:
     """Replace the keys of a scene by the ones that its settings ask for.
 
-    If keys are switched on, a key is added for each of `pictured_cameras`. It explains the picture as it was
+    If keys are switched on, a key is added for each of `pictured_views`. It explains the picture as it was
     baked, whatever the settings are now.
     """
     camera_planes.remove_camera_planes(scene, KEY_TAG)
     if not scene.rosy.key:
         return
     triangles = cache(text_triangles)
-    for camera, record in camera_planes.pictured_cameras(scene).items():
-        with suppress(RosyError):  # the camera was made panoramic after the bake
-            _add_key(scene, camera, record, triangles)
+    for camera, view, record in camera_planes.pictured_views(scene):
+        _add_key(scene, camera, view, record, triangles)
 
 
-def _add_key(scene: Scene, camera: Object, record: PropertyGroup, triangles: TextShapes) -> None:
+def _add_key(
+    scene: Scene, camera: Object, view: Camera, record: PropertyGroup, triangles: TextShapes
+) -> None:
     """Add a plane with a key, parented to a camera. Nothing is added if the key would be empty.
 
     `record` is the record of the picture, and `triangles` a function that returns the triangles of a text.
     """
-    view = camera_of_object(scene, scene_depsgraph(scene), camera)
     picture = _draw(scene, view, record, triangles)
     if picture is None:
         return

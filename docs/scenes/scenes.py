@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from stage import (
     add,
     bake,
+    bevel,
     box,
     camera,
     collection,
@@ -30,6 +31,7 @@ from stage import (
     material,
     modify,
     polygons,
+    prism,
     render,
     smooth,
 )
@@ -95,23 +97,30 @@ def portrait():
     bake("engraving")
 
 
+def _house(half_width, eaves, ridge, half_depth):
+    """A house whose gables are polygons of five corners."""
+    gable = [
+        (-half_width, 0),
+        (half_width, 0),
+        (half_width, eaves),
+        (0, ridge),
+        (-half_width, eaves),
+    ]
+    return prism("House", *([(x, y, z) for x, z in gable] for y in (half_depth, -half_depth)))
+
+
 def building():
     """A house with live Boolean windows and bevels, and gables of five corners, in the sun."""
-    gable = [(-1.6, 0), (1.6, 0), (1.6, 2.2), (0, 3.5), (-1.6, 2.2)]
-    points = [(x, y, z) for y in (-2.4, 2.4) for x, z in gable]
-    sides = [(i, (i + 1) % 5, 5 + (i + 1) % 5, 5 + i) for i in range(5)]
-    house = polygons(
-        "House", points, [(4, 3, 2, 1, 0), (5, 6, 7, 8, 9), *[side[::-1] for side in sides]]
-    )
+    house = _house(1.6, 2.2, 3.5, 2.4)
     windows = [box(0.5, 0.5, 0.75, at=(x, -2.4, z)) for x in (-0.85, 0.85) for z in (0.85, 1.95)]
     windows += [box(0.5, 0.5, 0.75, at=(1.6, y, 1.2)) for y in (-1.6, -0.5, 0.6, 1.7)]
     windows += [
         box(0.6, 0.5, 1.4, at=(0, -2.4, 0.6)),
         add("cylinder", radius=0.28, depth=0.5, location=(0, -2.4, 2.75), rotation=(pi / 2, 0, 0)),
     ]
-    modify(cut(house, *windows), "BEVEL", width=0.04, segments=2, limit_method="ANGLE")
-    chimney = modify(box(0.4, 0.4, 1.2, at=(0.8, 0.9, 3.2)), "BEVEL", width=0.03, segments=2)
-    wall = modify(box(5, 0.15, 0.6, at=(4.3, -2.3, 0.3)), "BEVEL", width=0.04, segments=2)
+    bevel(cut(house, *windows), 0.04)
+    chimney = bevel(box(0.4, 0.4, 1.2, at=(0.8, 0.9, 3.2)), 0.03)
+    wall = bevel(box(5, 0.15, 0.6, at=(4.3, -2.3, 0.3)), 0.04)
     ground = box(30, 30, 0.1, at=(0, 0, -0.05))
     camera((6.2, -8.4, 2.9), (0.9, 0, 1.35), 38)
     lamp("SUN", (7, -2.5, 5), 3, angle=0.01)
@@ -241,21 +250,13 @@ def dancers():
 
 def street():
     """A street of instances that Geometry Nodes makes of one house, at random sizes."""
-    house = polygons(
-        "House",
-        [(x, y, z) for y in (-1, 1) for x, z in ((-1, 0), (1, 0), (1, 2), (0, 3), (-1, 2))],
-        [
-            (4, 3, 2, 1, 0),
-            (5, 6, 7, 8, 9),
-            *[(5 + i, 5 + (i + 1) % 5, (i + 1) % 5, i) for i in range(5)],
-        ],
-    )
+    house = _house(1, 2, 3, 1)
     openings = [box(0.45, 3, 0.6, at=(x, 0, 1.35)) for x in (-0.5, 0.5)]
     openings += [box(0.5, 3, 1.0, at=(0, 0, 0.4)), box(3, 0.5, 0.6, at=(0, 0, 1.35))]
     for opening in openings:
         opening.parent = house
     cut(house, *openings)
-    modify(house, "BEVEL", width=0.03, segments=2, limit_method="ANGLE")
+    bevel(house, 0.03)
     tree = bpy.data.node_groups.new("Street", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     grid, info, put, out, size, position = (
@@ -294,17 +295,13 @@ def street():
 
 
 def poster():
-    """A head in ink over her own toon material; the floor and wall behind her are engraved."""
+    """A head in ink over her own material; the floor and wall behind her are engraved."""
     suzanne = smooth(
         add("monkey", location=(0, 0, 1.0), rotation=(radians(-8), 0, radians(-22))), 3
     )
     material(suzanne, (0.8, 0.28, 0.12))
-    plinth = modify(
-        add("cylinder", vertices=64, radius=0.9, depth=0.5, location=(0, 0, -0.1)),
-        "BEVEL",
-        width=0.05,
-        segments=3,
-        limit_method="ANGLE",
+    plinth = bevel(
+        add("cylinder", vertices=64, radius=0.9, depth=0.5, location=(0, 0, -0.1)), 0.05, 3
     )
     material(plinth, (0.75, 0.7, 0.6))
     floor, wall = box(16, 9, 0.1, at=(0, 1.5, -0.4)), box(16, 0.1, 8, at=(0, 3, 3))
@@ -372,49 +369,18 @@ def still_life():
 def machine():
     """A flange, a gear and a nut with live Booleans and bevels."""
 
-    def rod(radius, depth, at, sides=64, turn=(0, 0, 0)):
-        return add(
-            "cylinder", vertices=sides, radius=radius, depth=depth, location=at, rotation=turn
-        )
+    def rod(radius, depth, at, sides=64):
+        return add("cylinder", vertices=sides, radius=radius, depth=depth, location=at)
 
+    flange = cut(rod(1.2, 0.3, (0, 0, 0.15), 96), rod(0.6, 1.3, (0, 0, 0.75)), by="UNION")
     angles = [i * pi / 4 for i in range(8)]
-    flange = rod(1.2, 0.3, (0, 0, 0.15), 96)
-    modify(flange, "BOOLEAN", operation="UNION", object=rod(0.6, 1.4, (0, 0, 0.7), 64))
     holes = [rod(0.12, 2, (0.92 * cos(a), 0.92 * sin(a), 0), 24) for a in angles]
-    flange.modifiers[0].object.hide_render = True
-    flange.modifiers[0].object.hide_set(True)
-    modify(
-        cut(flange, rod(0.42, 4, (0, 0, 0), 64), *holes),
-        "BEVEL",
-        width=0.03,
-        segments=3,
-        limit_method="ANGLE",
-    )
+    bevel(cut(flange, rod(0.42, 4, (0, 0, 0)), *holes), 0.03, 3)
     outline = [((1.05 if i % 4 < 2 else 0.82), i * pi / 28) for i in range(56)]
-    ring = [(2.4 + r * cos(a), 0.3 + r * sin(a), z) for z in (0, 0.4) for r, a in outline]
-    gear = polygons(
-        "Gear",
-        ring,
-        [
-            tuple(range(55, -1, -1)),
-            tuple(range(56, 112)),
-            *[(i, (i + 1) % 56, 56 + (i + 1) % 56, 56 + i) for i in range(56)],
-        ],
-    )
-    modify(
-        cut(gear, rod(0.3, 2, (2.4, 0.3, 0), 48)),
-        "BEVEL",
-        width=0.025,
-        segments=2,
-        limit_method="ANGLE",
-    )
-    nut = modify(
-        cut(rod(0.5, 0.45, (1.2, -1.5, 0.23), 6), rod(0.28, 2, (1.2, -1.5, 0), 48)),
-        "BEVEL",
-        width=0.04,
-        segments=3,
-        limit_method="ANGLE",
-    )
+    rings = ([(2.4 + r * cos(a), 0.3 + r * sin(a), z) for r, a in outline] for z in (0, 0.4))
+    gear = bevel(cut(prism("Gear", *rings), rod(0.3, 2, (2.4, 0.3, 0), 48)), 0.025)
+    nut = rod(0.5, 0.45, (1.2, -1.5, 0.23), 6)
+    bevel(cut(nut, rod(0.28, 2, (1.2, -1.5, 0), 48)), 0.04, 3)
     table = box(20, 14, 0.1, at=(1, 1, -0.05))
     camera((0.0, -5.6, 4.0), (1.1, -0.1, 0.25), 50)
     lamp("AREA", (-3, -3, 5), 700, size=0.8)
@@ -438,40 +404,22 @@ def temple():
     """Fluted columns by live Arrays on steps, engraved."""
     sides = 40
     circle = [(0.36 - 0.03 * (i % 2), i * 2 * pi / sides) for i in range(sides)]
-    rings = [(f * r * cos(a), f * r * sin(a), z) for z, f in ((0, 1), (3, 0.85)) for r, a in circle]
-    walls = [(i, (i + 1) % sides, sides + (i + 1) % sides, sides + i) for i in range(sides)]
-    column = polygons("Column", rings, walls)
+    rings = (
+        [(f * r * cos(a), f * r * sin(a), z) for r, a in circle] for z, f in ((0, 1), (3, 0.85))
+    )
+    column = prism("Column", *rings)
     column.location = -3, 0, 0.45
-    tops = [
-        modify(box(0.95, 0.95, 0.16, at=(-3, 0, z)), "BEVEL", width=0.03, segments=2)
-        for z in (0.37, 3.53)
-    ]
+    tops = [bevel(box(0.95, 0.95, 0.16, at=(-3, 0, z)), 0.03) for z in (0.37, 3.53)]
     for obj in (column, *tops):
-        modify(
-            obj,
-            "ARRAY",
-            count=5,
-            use_relative_offset=False,
-            use_constant_offset=True,
-            constant_offset_displace=(1.5, 0, 0),
-        )
-        modify(
-            obj,
-            "ARRAY",
-            count=2,
-            use_relative_offset=False,
-            use_constant_offset=True,
-            constant_offset_displace=(0, 2.6, 0),
-        )
+        for count, offset in ((5, (1.5, 0, 0)), (2, (0, 2.6, 0))):
+            array = modify(obj, "ARRAY", count=count, constant_offset_displace=offset).modifiers[-1]
+            array.use_relative_offset, array.use_constant_offset = False, True
     steps = [
         box(8.2 - 0.5 * i, 4.6 - 0.5 * i, 0.15, at=(0, 1.3, -0.1 + 0.15 * i)) for i in range(3)
     ]
     beam = box(7.2, 3.6, 0.5, at=(0, 1.3, 3.86))
-    roof = polygons(
-        "Roof",
-        [(x, y, z) for y in (-0.6, 3.2) for x, z in ((-3.8, 4.11), (3.8, 4.11), (0, 5.3))],
-        [(0, 1, 2), (5, 4, 3), (1, 0, 3, 4), (2, 1, 4, 5), (0, 2, 5, 3)],
-    )
+    gable = (-3.8, 4.11), (3.8, 4.11), (0, 5.3)
+    roof = prism("Roof", *([(x, y, z) for x, z in gable] for y in (3.2, -0.6)))
     ground = box(60, 40, 0.1, at=(0, 5, -0.22))
     camera((-6.0, -10.6, 1.9), (-0.1, 0.6, 2.4), 34)
     lamp("SUN", (-7, -5, 6), 3, angle=0.01)

@@ -1,7 +1,5 @@
 """What the scenes share: an empty scene, meshes with live modifiers, lamps, a camera, and drawing."""
 
-from math import radians
-
 import bpy
 from mathutils import Matrix, Vector
 
@@ -24,9 +22,9 @@ def add(kind: str, **options) -> bpy.types.Object:
     return bpy.context.object
 
 
-def box(*size: float, at=(0, 0, 0), turn=0.0) -> bpy.types.Object:
+def box(*size: float, at=(0, 0, 0)) -> bpy.types.Object:
     """Add a box of a size around a point; its scale is applied, so that bevels are even."""
-    cube = add("cube", size=1, location=at, rotation=(0, 0, radians(turn)))
+    cube = add("cube", size=1, location=at)
     cube.data.transform(Matrix.Diagonal((*size, 1)))
     return cube
 
@@ -36,6 +34,13 @@ def polygons(name: str, points, faces) -> bpy.types.Object:
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points, [], faces)
     return link(bpy.data.objects.new(name, mesh))
+
+
+def prism(name: str, first, last) -> bpy.types.Object:
+    """Add a solid between two outlines of as many points, which run counter-clockwise as seen from beyond the last one."""
+    n = len(first)
+    sides = [(i, (i + 1) % n, n + (i + 1) % n, n + i) for i in range(n)]
+    return polygons(name, [*first, *last], [range(n)[::-1], range(n, 2 * n), *sides])
 
 
 def lathe(name: str, profile, at=(0, 0, 0), levels: int = 2) -> bpy.types.Object:
@@ -71,13 +76,18 @@ def smooth(obj: bpy.types.Object, levels: int = 2) -> bpy.types.Object:
     return modify(obj, "SUBSURF", levels=levels, render_levels=levels) if levels else obj
 
 
-def cut(obj: bpy.types.Object, *cutters: bpy.types.Object) -> bpy.types.Object:
-    """Subtract objects by one live Boolean modifier each, and hide them."""
-    for cutter in cutters:
-        modify(obj, "BOOLEAN", object=cutter)
-        cutter.hide_render, cutter.display_type = True, "WIRE"
-        cutter.hide_set(True)
+def cut(obj: bpy.types.Object, *others: bpy.types.Object, by="DIFFERENCE") -> bpy.types.Object:
+    """Subtract objects, or unite with them, by one live Boolean modifier each, and hide them."""
+    for other in others:
+        modify(obj, "BOOLEAN", object=other, operation=by)
+        other.hide_render, other.display_type = True, "WIRE"
+        other.hide_set(True)
     return obj
+
+
+def bevel(obj: bpy.types.Object, width: float, segments: int = 2) -> bpy.types.Object:
+    """Add a live Bevel of the edges of at least 30 degrees."""
+    return modify(obj, "BEVEL", width=width, segments=segments, limit_method="ANGLE")
 
 
 def collection(name: str, preset: str, *objects: bpy.types.Object) -> None:
